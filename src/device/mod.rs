@@ -1,0 +1,142 @@
+//! What renders: one small trait that the CPU, each GPU and the fake device implement. Callers know no other
+//! difference between them.
+
+pub mod conformance;
+pub mod cpu;
+pub mod fake;
+
+use crate::film::Film;
+use crate::plan::{Residency, UpdatePlan};
+use crate::scene::{Frame, Shot};
+use std::sync::atomic::{AtomicBool, Ordering};
+
+/// What kind of device it is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum DeviceKind {
+    /// Cores of the host.
+    Cpu,
+    /// The fake device of tests: scripted, draws nothing.
+    Fake,
+}
+
+impl DeviceKind {
+    /// The word in reports.
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Cpu => "cpu",
+            Self::Fake => "fake",
+        }
+    }
+}
+
+/// What a device is.
+#[derive(Clone, Debug, PartialEq)]
+pub struct DeviceInfo {
+    /// Its name on the command line and in reports.
+    pub name: String,
+    /// Its kind.
+    pub kind: DeviceKind,
+    /// What it is, for people: model, SIMD width.
+    pub description: String,
+    /// Threads that trace.
+    pub threads: usize,
+    /// Bytes that it may hold.
+    pub budget_bytes: u64,
+}
+
+/// Asks a trace to end early.
+#[derive(Debug, Default)]
+pub struct Stop(AtomicBool);
+
+impl Stop {
+    /// Asks.
+    pub fn ask(&self) {
+        self.0.store(true, Ordering::Relaxed);
+    }
+
+    /// Whether it was asked.
+    pub fn asked(&self) -> bool {
+        self.0.load(Ordering::Relaxed)
+    }
+}
+
+/// Rays traced for one frame.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct RayCounts {
+    /// Through pixels.
+    pub camera: u64,
+    /// To lights.
+    pub shadow: u64,
+    /// Mirrored.
+    pub mirrored: u64,
+    /// Refracted.
+    pub refracted: u64,
+}
+
+/// What applying a plan cost. A term that a device does not have is None.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct UpdateCost {
+    /// Bytes of parts handed to what the device holds; derived data not counted.
+    pub uploaded_bytes: u64,
+    /// Handing them over, ms.
+    pub upload_ms: Option<f64>,
+    /// Building and refitting, ms.
+    pub update_ms: Option<f64>,
+}
+
+/// A traced frame and what it cost.
+#[derive(Debug)]
+pub struct Traced {
+    /// The picture, linear.
+    pub film: Film,
+    /// Rays.
+    pub rays: RayCounts,
+    /// Tracing and shading, ms.
+    pub trace_ms: f64,
+    /// Bringing the film back, ms; None where it need not be.
+    pub readback_ms: Option<f64>,
+}
+
+/// Why a device did not do what it was asked.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum DeviceError {
+    /// The frame does not fit.
+    #[error(
+        "{device}: the frame needs {needed_bytes} bytes, {budget_bytes} are allowed; raise --device-memory or use a device with more memory"
+    )]
+    OutOfMemory {
+        /// Which device.
+        device: String,
+        /// What the frame needs.
+        needed_bytes: u64,
+        /// What is allowed.
+        budget_bytes: u64,
+    },
+    /// The device is gone and holds nothing any more.
+    #[error("{device}: lost: {why}")]
+    Lost {
+        /// Which device.
+        device: String,
+        /// What is known.
+        why: String,
+    },
+    /// [`Stop`] was asked.
+    #[error("stopped")]
+    Stopped,
+}
+
+/// What renders. All calls come from one thread at a time.
+pub trait Device: Send {
+    /// What it is.
+    fn info(&self) -> &DeviceInfo;
+
+    /// What it holds.
+    fn residency(&self) -> &Residency;
+
+    /// Makes a frame resident as the plan says. The only thing that changes what the device holds. The plan must
+    /// have been made for this frame and for what the device holds now.
+    fn apply(&mut self, plan: &UpdatePlan, frame: &Frame) -> Result<UpdateCost, DeviceError>;
+
+    /// Traces the frame that is resident.
+    fn trace(&mut self, frame: &Frame, shot: &Shot, stop: &Stop) -> Result<Traced, DeviceError>;
+}

@@ -1,0 +1,50 @@
+//! Film, AOVs, colour, comparison.
+
+use crate::scene::{Aov, AovSet};
+
+/// A linear float picture with its auxiliary pictures; rows from the top.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Film {
+    /// Width and height in pixels.
+    pub size: [u32; 2],
+    /// Linear RGB, premultiplied where alpha is there.
+    pub rgb: Vec<[f32; 3]>,
+    /// Coverage, where it was asked for.
+    pub alpha: Option<Vec<f32>>,
+    /// Auxiliary pictures.
+    pub aovs: Aovs,
+}
+
+/// Auxiliary pictures, each there if asked for.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Aovs {
+    /// Distance along the ray through the pixel's centre; infinite where nothing is hit.
+    pub depth: Option<Vec<f32>>,
+    /// Shading normal; 0 where nothing is hit.
+    pub normal: Option<Vec<[f32; 3]>>,
+    /// Position in the world; 0 where nothing is hit.
+    pub position: Option<Vec<[f32; 3]>>,
+    /// Diffuse reflectance, mean over the samples.
+    pub albedo: Option<Vec<[f32; 3]>>,
+    /// `[id.part, id.triangle]`, 0xFFFFFFFF where nothing is hit.
+    pub id: Option<Vec<[u32; 2]>>,
+}
+
+impl Film {
+    /// A black film with room for what is asked.
+    pub fn new(size: [u32; 2], alpha: bool, aovs: AovSet) -> Self {
+        let n = size[0] as usize * size[1] as usize;
+        Self {
+            size,
+            rgb: vec![[0.0; 3]; n],
+            alpha: alpha.then(|| vec![0.0; n]),
+            aovs: Aovs {
+                depth: aovs.contains(Aov::Depth).then(|| vec![f32::INFINITY; n]),
+                normal: aovs.contains(Aov::Normal).then(|| vec![[0.0; 3]; n]),
+                position: aovs.contains(Aov::Position).then(|| vec![[0.0; 3]; n]),
+                albedo: aovs.contains(Aov::Albedo).then(|| vec![[0.0; 3]; n]),
+                id: aovs.contains(Aov::Id).then(|| vec![[u32::MAX; 2]; n]),
+            },
+        }
+    }
+}

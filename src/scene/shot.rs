@@ -1,0 +1,117 @@
+//! A shot: everything but the geometry that bears on the film of one frame.
+
+use super::camera::Camera;
+use super::light::Light;
+use super::part::PartHasher;
+use crate::math::Vec3;
+
+/// The pixel filter, sampled, not splatted.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default, serde::Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Filter {
+    /// Width 1.
+    #[default]
+    Box,
+    /// Radius 1.
+    Triangle,
+    /// Radius 1.5, σ 0.5.
+    Gaussian,
+}
+
+/// One kind of auxiliary picture.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[repr(u8)]
+pub enum Aov {
+    /// Distance along the ray, infinite where nothing is hit.
+    Depth,
+    /// Shading normal, turned to the viewer.
+    Normal,
+    /// Position in the world.
+    Position,
+    /// Diffuse reflectance, mean over the samples.
+    Albedo,
+    /// `id.part` and `id.triangle`.
+    Id,
+}
+
+impl Aov {
+    /// All of them, in the order in which they are written.
+    pub const ALL: [Self; 5] = [Self::Depth, Self::Normal, Self::Position, Self::Albedo, Self::Id];
+
+    /// The word on the command line and in the job file.
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Depth => "depth",
+            Self::Normal => "normal",
+            Self::Position => "position",
+            Self::Albedo => "albedo",
+            Self::Id => "id",
+        }
+    }
+}
+
+/// A set of [`Aov`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+pub struct AovSet(u8);
+
+impl AovSet {
+    /// Adds one.
+    pub fn insert(&mut self, aov: Aov) {
+        self.0 |= 1 << aov as u8;
+    }
+
+    /// Whether it holds one.
+    pub fn contains(self, aov: Aov) -> bool {
+        self.0 & 1 << aov as u8 != 0
+    }
+
+    /// Whether it holds none.
+    pub fn is_empty(self) -> bool {
+        self.0 == 0
+    }
+}
+
+/// Everything but the geometry that bears on the film of one frame.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Shot {
+    /// The camera.
+    pub camera: Camera,
+    /// The lights in the order given; sums follow it.
+    pub lights: Vec<Light>,
+    /// Ambient light Ia, linear RGB.
+    pub ambient: Vec3,
+    /// What is seen where nothing is hit, linear RGB.
+    pub background: Vec3,
+    /// Width and height in pixels, each 1 or more.
+    pub size: [u32; 2],
+    /// Samples a pixel, 1 or more.
+    pub samples: u32,
+    /// Pixel filter.
+    pub filter: Filter,
+    /// Bounces of mirrored and refracted rays.
+    pub depth: u32,
+    /// Seed of the samples.
+    pub seed: u32,
+    /// Rays below this weight in every channel are not traced.
+    pub prune: f32,
+    /// Whether the background is left out and coverage kept.
+    pub alpha: bool,
+    /// Auxiliary pictures.
+    pub aovs: AovSet,
+}
+
+impl Shot {
+    /// Adds it to a fingerprint.
+    pub fn hash_into(&self, h: &mut PartHasher) {
+        self.camera.hash_into(h);
+        h.u64(self.lights.len() as u64);
+        for l in &self.lights {
+            l.hash_into(h);
+        }
+        h.slice(&[self.ambient, self.background]);
+        h.slice(&self.size);
+        h.slice(&[self.samples, self.filter as u32, self.depth, self.seed]);
+        h.f32(self.prune);
+        h.u64(u64::from(self.alpha) | u64::from(self.aovs.0) << 8);
+    }
+}
