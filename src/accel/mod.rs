@@ -1,1 +1,62 @@
-//! To be written.
+//! Bounding volume hierarchies and the canonical hit: a ray's hit is a function of the ray and the set of triangles
+//! alone, never of the tree.
+
+use crate::math::Vec3;
+
+/// A ray; the direction need not be unit. Distances are in units of its length.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Ray {
+    /// Where it starts.
+    pub origin: Vec3,
+    /// Where it goes.
+    pub direction: Vec3,
+}
+
+/// Where a ray meets a triangle.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Hit {
+    /// The canonical distance: max(t of the plane, entry of the triangle's own box).
+    pub distance: f32,
+    /// The object, by its place in the frame.
+    pub object: u32,
+    /// The triangle, by its place in the object's [`crate::scene::Triangles`].
+    pub triangle: u32,
+    /// Weights of the triangle's second and third corner; the first has 1 − u − v.
+    pub barycentric: [f32; 2],
+}
+
+/// A hit's place in the order of candidates along a ray: (distance, primitive). Primitives count through objects
+/// and their triangles.
+#[derive(Clone, Copy, Debug, PartialEq, PartialOrd)]
+pub struct HitOrder {
+    /// The canonical distance.
+    pub distance: f32,
+    /// The primitive.
+    pub primitive: u32,
+}
+
+/// What rays are traced against. Every implementation gives the same answers for the same triangles.
+pub trait Aggregate: Sync {
+    /// The first candidate in the order (distance, primitive); after the given one, where one is given.
+    fn closest(&self, ray: &Ray, after: Option<HitOrder>) -> Option<Hit>;
+
+    /// Whether any candidate has a distance below `end` (strictly).
+    fn occluded(&self, ray: &Ray, end: f32) -> bool;
+
+    /// A hit's place in the order.
+    fn order(&self, hit: &Hit) -> HitOrder;
+
+    /// [`Self::closest`] of many rays, coherent ones side by side; the answers are those of single rays.
+    fn closest_batch(&self, rays: &[Ray], hits: &mut [Option<Hit>]) {
+        for (ray, hit) in rays.iter().zip(hits) {
+            *hit = self.closest(ray, None);
+        }
+    }
+
+    /// [`Self::occluded`] of many rays; the answers are those of single rays.
+    fn occluded_batch(&self, rays: &[Ray], ends: &[f32], occluded: &mut [bool]) {
+        for ((ray, &end), o) in rays.iter().zip(ends).zip(occluded) {
+            *o = self.occluded(ray, end);
+        }
+    }
+}
