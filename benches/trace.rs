@@ -99,6 +99,7 @@ fn median<T>(runs: usize, mut f: impl FnMut() -> T) -> (f64, T) {
         })
         .collect();
     times.sort_by(f64::total_cmp);
+    print!("[{:.1}] ", times[0]);
     (times[times.len() / 2], last)
 }
 

@@ -31,7 +31,7 @@ impl Aabb {
     }
 
     /// The least box that holds both.
-    #[inline]
+    #[inline(always)]
     #[must_use]
     pub fn union(&self, other: &Self) -> Self {
         Self {
@@ -52,7 +52,7 @@ impl Aabb {
 
     /// A triangle's own box: that of its corners, each side moved out by 8 ULP (2⁻²³) of the largest extent and then
     /// to the next float.
-    #[inline]
+    #[inline(always)]
     pub fn own(corners: &[[f32; 3]; 3]) -> Self {
         let [a, b, c] = corners;
         let min: [f32; 3] = std::array::from_fn(|k| Lanes::min(a[k], Lanes::min(b[k], c[k])));

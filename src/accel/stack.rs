@@ -61,11 +61,16 @@ impl Stack {
         self.len += 1;
     }
 
-    /// Takes the topmost.
+    /// Takes the topmost that is not entered after a distance; drops those above it.
     #[inline(always)]
-    pub(crate) fn pop(&mut self) -> Option<Waiting> {
-        self.len = self.len.checked_sub(1)?;
-        // SAFETY: all below the former len were written
-        Some(unsafe { self.waiting[self.len].assume_init() })
+    pub(crate) fn pop_before(&mut self, distance: f32) -> Option<u32> {
+        loop {
+            self.len = self.len.checked_sub(1)?;
+            // SAFETY: all below the former len were written
+            let top = unsafe { self.waiting[self.len].assume_init() };
+            if top.entry() <= distance {
+                return Some(top.child());
+            }
+        }
     }
 }

@@ -31,43 +31,43 @@ impl Tree {
         first: u32,
         search: &mut Search,
     ) -> Option<Place> {
-        let scalar = ScalarRay::new(ray);
         let slab = SlabRay::<L>::new(ray);
-        let shear = ShearRay::<L>::new(ray);
         let mut stack = Stack::new();
+        let mut next = nearest_child(self.nodes.first()?, &slab, search.before.distance, &mut stack);
+        // most rays of many a picture end here
+        next?;
+        let scalar = ScalarRay::new(ray);
+        let shear = ShearRay::<L>::new(ray);
         let mut found = None;
-        let mut node = self.nodes.first()?;
         loop {
-            push_children(node, &slab, search.before.distance, &mut stack);
-            // the nearest child that waits: a node, or leaves until there is one
-            loop {
-                let next = stack.pop();
-                let Some(next) = next else { return found };
-                if next.entry() > search.before.distance {
-                    continue;
-                }
-                let child = next.child();
-                if child & LEAF == 0 {
-                    node = &self.nodes[child as usize];
-                    break;
-                }
-                let block = child & !LEAF;
-                if let Some(lane) =
-                    search_block::<L, ANY>(&self.blocks[block as usize], &shear, &scalar, first, search)
-                {
-                    found = Some(Place { block, lane });
-                    if ANY {
-                        return found;
-                    }
+            let child = match next {
+                Some(child) => child,
+                None => match stack.pop_before(search.before.distance) {
+                    Some(child) => child,
+                    None => return found,
+                },
+            };
+            if child & LEAF == 0 {
+                next = nearest_child(&self.nodes[child as usize], &slab, search.before.distance, &mut stack);
+                continue;
+            }
+            let block = child & !LEAF;
+            if let Some(lane) =
+                search_block::<L, ANY>(&self.blocks[block as usize], &shear, &scalar, first, search)
+            {
+                found = Some(Place { block, lane });
+                if ANY {
+                    return found;
                 }
             }
+            next = None;
         }
     }
 }
 
-/// Adds the children that a ray enters not after a distance.
+/// The child that a ray enters first of those that it enters not after a distance; the others wait.
 #[inline(always)]
-fn push_children<L: Lanes8>(node: &Node, slab: &SlabRay<L>, distance: f32, stack: &mut Stack) {
+fn nearest_child<L: Lanes8>(node: &Node, slab: &SlabRay<L>, distance: f32, stack: &mut Stack) -> Option<u32> {
     let [sx, sy, sz] = slab.near_side;
     let planes = &node.planes;
     let (entry, exit) = slab.pass(
@@ -76,15 +76,24 @@ fn push_children<L: Lanes8>(node: &Node, slab: &SlabRay<L>, distance: f32, stack
     );
     let mut entered = entry.le(exit.min(L::splat(distance)));
     if entered == 0 {
-        return;
+        return None;
+    }
+    let first = entered.trailing_zeros() as usize & 7;
+    entered &= entered - 1;
+    if entered == 0 {
+        return Some(node.children[first]);
     }
     let entries = entry.store();
+    let waiting = |lane: usize| Waiting::new(entries[lane], node.children[lane]);
+    let mut nearest = waiting(first);
     let floor = stack.len();
     while entered != 0 {
-        let lane = entered.trailing_zeros() as usize & 7;
+        let next = waiting(entered.trailing_zeros() as usize & 7);
         entered &= entered - 1;
-        stack.insert(Waiting::new(entries[lane], node.children[lane]), floor);
+        stack.insert(nearest.max(next), floor);
+        nearest = nearest.min(next);
     }
+    Some(nearest.child())
 }
 
 /// Tests the triangles of a leaf; gives the lane of the last one that was found.
