@@ -5,6 +5,7 @@ pub mod frame;
 pub mod geometry;
 pub mod light;
 pub mod material;
+pub mod normals;
 pub mod part;
 pub mod shot;
 
