@@ -1,6 +1,26 @@
 //! Bounding volume hierarchies and the canonical hit: a ray's hit is a function of the ray and the set of triangles
 //! alone, never of the tree.
 
+mod binary;
+mod brute;
+mod collapse;
+mod fit;
+mod lanes;
+mod slab;
+mod stack;
+mod traced;
+mod traverse;
+mod tree;
+mod triangle;
+
+pub use binary::Quality;
+pub use brute::BruteForce;
+pub use lanes::Width;
+pub use slab::Aabb;
+pub use traced::{TracedObject, TracedScene};
+pub use tree::{Tree, TreeCounts};
+pub use triangle::has_area;
+
 use crate::math::Vec3;
 
 /// A ray; the direction need not be unit. Distances are in units of its length.
