@@ -5,6 +5,8 @@ pub mod conformance;
 pub mod cpu;
 pub mod fake;
 
+pub use crate::kernel::RayCounts;
+
 use crate::film::Film;
 use crate::plan::{Residency, UpdatePlan};
 use crate::scene::{Frame, Shot};
@@ -58,19 +60,6 @@ impl Stop {
     pub fn asked(&self) -> bool {
         self.0.load(Ordering::Relaxed)
     }
-}
-
-/// Rays traced for one frame.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct RayCounts {
-    /// Through pixels.
-    pub camera: u64,
-    /// To lights.
-    pub shadow: u64,
-    /// Mirrored.
-    pub mirrored: u64,
-    /// Refracted.
-    pub refracted: u64,
 }
 
 /// What applying a plan cost. A term that a device does not have is None.

@@ -59,7 +59,8 @@ mod tests {
 
     fn constants() -> CameraConstants {
         // looks along −z from z = 2; 90° high, twice as wide: at z = 1 the picture is 4 wide and 2 high
-        let camera = Camera { eye: DVec3::new(0.0, 0.0, 2.0), look_at: DVec3::ZERO, up: DVec3::Y, fov_deg: 90.0 };
+        let camera =
+            Camera { eye: DVec3::new(0.0, 0.0, 2.0), look_at: DVec3::ZERO, up: DVec3::Y, fov_deg: 90.0 };
         CameraConstants::new(&camera, [200, 100])
     }
 

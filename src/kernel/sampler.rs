@@ -41,7 +41,8 @@ fn triangle(u: f32) -> f32 {
 
 /// The gaussian of σ 0.5, cut off at 1.5.
 fn gaussian(u: f32) -> f32 {
-    GAUSSIAN_SCALE * inverse_erf((2.0 * u - 1.0) * GAUSSIAN_WITHIN_REACH).clamp(-GAUSSIAN_REACH, GAUSSIAN_REACH)
+    GAUSSIAN_SCALE
+        * inverse_erf((2.0 * u - 1.0) * GAUSSIAN_WITHIN_REACH).clamp(-GAUSSIAN_REACH, GAUSSIAN_REACH)
 }
 
 /// Mike Giles, "Approximating the erfinv function", GPU Computing Gems Jade Edition, 2011 (single precision).
