@@ -6,7 +6,7 @@
 //! eye's side; shadow rays start 1e-3 of the way to the light.
 
 use rayon::prelude::*;
-use rentix::accel::{Aggregate, Quality, Ray, TracedScene, Tree, Width};
+use rentix::accel::{Aggregate, Quality, Ray, TracedObject, TracedScene, Tree, Width};
 use rentix::math::Vec3;
 use std::hint::black_box;
 use std::sync::Arc;
@@ -42,7 +42,7 @@ fn main() {
             tree.bytes() as f64 / 1e6,
             tree.counts()
         );
-        let scene = TracedScene::new(vec![Arc::new(tree)]);
+        let scene = TracedScene::new(vec![TracedObject::new(Arc::new(tree), None)]);
         for &width in Width::available() {
             let scene = scene.clone().with_width(width);
             trace(&scene, &camera, o.runs, &format!("{quality:?} {width:?}"));

@@ -44,7 +44,9 @@ impl Shape {
         let mut level = vec![subtree(0)];
         while !level.is_empty() {
             if shape.levels.len() == SPLIT_BY_NUMBER_LEVEL {
-                level.iter_mut().for_each(|s| s.node = None);
+                for s in &mut level {
+                    s.node = None;
+                }
             }
             let expanded: Vec<([Subtree; WIDTH], usize)> =
                 level.par_iter().with_min_len(256).map(|s| expand(*s, binary, &subtree)).collect();

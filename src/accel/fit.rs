@@ -35,7 +35,15 @@ impl Tree {
             });
         }
         let vertex_box = boxes.iter().fold(Aabb::EMPTY, |all, (_, b)| all.union(b));
-        Self { nodes, blocks, levels: shape.levels, triangle_count: triangles.len() as u32, vertex_box }
+        let bounds = nodes.first().map_or(Aabb::EMPTY, Node::bounds);
+        Self {
+            nodes,
+            bounds,
+            blocks,
+            levels: shape.levels,
+            triangle_count: triangles.len() as u32,
+            vertex_box,
+        }
     }
 }
 

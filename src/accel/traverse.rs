@@ -74,7 +74,8 @@ fn nearest_child<L: Lanes8>(node: &Node, slab: &SlabRay<L>, distance: f32, stack
         [L::load(&planes[sx][0]), L::load(&planes[sy][1]), L::load(&planes[sz][2])],
         [L::load(&planes[1 - sx][0]), L::load(&planes[1 - sy][1]), L::load(&planes[1 - sz][2])],
     );
-    let mut entered = entry.le(exit.min(L::splat(distance)));
+    // of a ray that is not finite the exit may be NaN; then it stays so, and nothing is entered
+    let mut entered = entry.le(L::splat(distance).min(exit));
     if entered == 0 {
         return None;
     }
@@ -123,7 +124,7 @@ fn search_block<L: Lanes8, const ANY: bool>(
         let lane = inside.trailing_zeros() as usize & 7;
         inside &= inside - 1;
         let Some(distance) = scalar.distance_in_plane(&block.corners_of(lane), t[lane]) else { continue };
-        let candidate = HitOrder { distance, primitive: first + block.triangles[lane] };
+        let candidate = HitOrder { distance, primitive: first.wrapping_add(block.triangles[lane]) };
         if search.admits(candidate) {
             found = Some(lane as u32);
             if ANY {

@@ -56,6 +56,8 @@ pub struct Tree {
     pub(crate) levels: Vec<Range<usize>>,
     pub(crate) triangle_count: u32,
     pub(crate) vertex_box: Aabb,
+    /// The box of the root's children.
+    pub(crate) bounds: Aabb,
 }
 
 /// How large a tree is.
