@@ -109,6 +109,14 @@ pub enum DeviceError {
         /// What is known.
         why: String,
     },
+    /// The frame was not made resident before it was traced.
+    #[error("{device}: object {object} of the frame is not resident; its plan must be applied first")]
+    NotResident {
+        /// Which device.
+        device: String,
+        /// The object, by its place in the frame.
+        object: usize,
+    },
     /// [`Stop`] was asked.
     #[error("stopped")]
     Stopped,

@@ -1,11 +1,10 @@
 //! Direct light: shadow rays from many surfaces to one light after the other.
 
 use super::light::{Incident, LightRecord, incident};
-use super::origin;
 use super::shade::{Reflected, faces, reflect};
 use super::world::{Surface, World};
 use super::{RayCounts, SURFACES_MAX};
-use crate::accel::{Aggregate, HitOrder, Ray};
+use crate::accel::{Aggregate, HitOrder, Ray, offset_origin};
 use crate::math::Vec3;
 
 /// A surface on its way to a colour.
@@ -78,7 +77,7 @@ impl ShadowRays {
             }
             let incident = incident(light, s.surface.position);
             if faces(&s.surface, incident.direction) && incident.radiance != Vec3::ZERO {
-                let origin = origin::leaving(&s.surface);
+                let origin = offset_origin(s.surface.position, s.surface.ng, s.surface.magnitude);
                 let (direction, end) = light.shadow_segment(origin);
                 self.rays.push(Ray { origin, direction });
                 self.ends.push(end);

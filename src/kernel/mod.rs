@@ -9,7 +9,6 @@ pub mod center;
 pub mod direct;
 pub mod light;
 pub mod material;
-pub mod origin;
 pub mod power;
 pub mod sampler;
 pub mod shade;

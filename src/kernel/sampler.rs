@@ -98,7 +98,7 @@ fn owen_scramble(x: u32, seed: u32) -> u32 {
     x.reverse_bits()
 }
 
-/// The finaliser of MurmurHash3, moved off its fixed point 0.
+/// The finaliser of `MurmurHash3`, moved off its fixed point 0.
 fn hash(x: u32) -> u32 {
     let x = x.wrapping_add(0x9e37_79b9);
     let x = (x ^ x >> 16).wrapping_mul(0x85eb_ca6b);

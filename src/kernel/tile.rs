@@ -109,10 +109,25 @@ pub fn trace_tile<A: Aggregate>(
     Some(counts)
 }
 
-/// The places in a band of the pixels in some of its columns, row by row: the order of a tile's pixels.
+/// A side of the blocks that a tile's pixels are ordered by, so that rays side by side are close.
+const BLOCK: u32 = 4;
+
+/// The pixels of a tile, in its order: (column, row in the band).
+fn pixels(rows: u32, columns: &Range<u32>) -> impl Iterator<Item = (u32, u32)> + use<> {
+    let columns = columns.clone();
+    (0..rows).step_by(BLOCK as usize).flat_map(move |top| {
+        let columns = columns.clone();
+        columns.clone().step_by(BLOCK as usize).flat_map(move |left| {
+            let right = columns.end.min(left + BLOCK);
+            (top..rows.min(top + BLOCK)).flat_map(move |row| (left..right).map(move |x| (x, row)))
+        })
+    })
+}
+
+/// The places in a band of a tile's pixels, in the tile's order.
 pub(super) fn places(band: &FilmBand, columns: &Range<u32>) -> impl Iterator<Item = usize> + use<> {
-    let (width, columns) = (band.width, columns.clone());
-    (0..band.rows).flat_map(move |row| columns.clone().map(move |x| (row * width + x) as usize))
+    let width = band.width;
+    pixels(band.rows, columns).map(move |(x, row)| (row * width + x) as usize)
 }
 
 impl TileBuffers {
@@ -125,11 +140,10 @@ impl TileBuffers {
         place: impl Fn([u32; 2]) -> [f32; 2],
     ) {
         self.rays.clear();
-        for y in band.first_row..band.first_row + band.rows {
-            for x in columns.clone() {
-                let [u, v] = place([x, y]);
-                self.rays.push(camera_ray(&scene.camera, x as f32 + u, y as f32 + v));
-            }
+        for (x, row) in pixels(band.rows, columns) {
+            let y = band.first_row + row;
+            let [u, v] = place([x, y]);
+            self.rays.push(camera_ray(&scene.camera, x as f32 + u, y as f32 + v));
         }
     }
 
@@ -207,16 +221,13 @@ impl TileBuffers {
                 return false;
             }
             let after = scene.aggregate.order(&path.hit);
-            match scene.aggregate.closest(&rays[path.pixel as usize], Some(after)) {
-                Some(hit) => {
-                    path.hit = hit;
-                    true
-                }
-                None => {
-                    sums[path.pixel as usize].escape(scene.shot, path.weight);
-                    false
-                }
+            let next = scene.aggregate.closest(&rays[path.pixel as usize], Some(after));
+            if let Some(hit) = next {
+                path.hit = hit;
+            } else {
+                sums[path.pixel as usize].escape(scene.shot, path.weight);
             }
+            next.is_some()
         });
     }
 

@@ -3,7 +3,7 @@
 
 use super::material::MaterialRecord;
 use super::power::powf;
-use crate::accel::{Hit, Ray};
+use crate::accel::{Aabb, Hit, Placement, Ray, hit_point, magnitude};
 use crate::math::{DAffine3, DMat3, Mat3, Vec3};
 use crate::scene::{ABSENT, Frame, Geometry, Material, Object};
 
@@ -16,8 +16,8 @@ pub struct Surface {
     pub ng: Vec3,
     /// The shading normal, turned to the side of `ng`; unit.
     pub n: Vec3,
-    /// Greatest absolute coordinates of the triangle's corners: the scale of the position's rounding error.
-    pub reach: Vec3,
+    /// How large the numbers are that the position comes from, by axis, for [`crate::accel::offset_origin`].
+    pub magnitude: Vec3,
     /// Diffuse reflectance.
     pub kd: Vec3,
     /// The material's place in [`World::materials`].
@@ -68,22 +68,25 @@ impl<'a> World<'a> {
         let [u, v] = hit.barycentric;
         let weights = [1.0 - u - v, u, v];
 
-        let mut p = corners.map(|i| Vec3::from(geometry.positions.0[i as usize]));
-        let mut reach = largest(p[0].abs(), p[1].abs(), p[2].abs());
-        let mut side = 1.0;
-        if let Some(t) = &object.transform {
-            p = p.map(|p| t.point(p));
-            reach = t.reach(reach);
-            side = t.orientation;
-        }
-        let ng = side * triangle_normal(p, -ray.direction);
+        let corners_of_object = corners.map(|i| geometry.positions.0[i as usize]);
+        let (p, magnitude, orientation) = match &object.transform {
+            None => {
+                let p = corners_of_object.map(Vec3::from);
+                (p, magnitude(&p), 1.0)
+            }
+            Some(t) => {
+                let [a, b, c] = corners_of_object.map(|p| t.placement.magnitude(p));
+                (corners_of_object.map(|p| t.placement.point(p)), a.max(b).max(c), t.orientation)
+            }
+        };
+        let ng = orientation * triangle_normal(p, -ray.direction);
         let ng = if ng.dot(ray.direction) > 0.0 { -ng } else { ng };
         let (material, kd) = self.material(object, triangle, corners, weights);
         Surface {
-            position: interpolate(p, weights),
+            position: hit_point(&p, hit.barycentric),
             ng,
             n: shading_normal(object, triangle, weights, ng),
-            reach,
+            magnitude,
             kd,
             material,
         }
@@ -139,12 +142,11 @@ impl WorldObject<'_> {
     }
 }
 
-/// An object's place in the world, in f32.
-#[derive(Clone, Copy, Debug)]
+/// Where an object stands, and what takes its normals there.
+#[derive(Clone, Debug)]
 struct Transform {
-    linear: Mat3,
-    translation: Vec3,
-    /// The cofactors of the linear part: what takes normals, finite where the inverse is not.
+    placement: Placement,
+    /// The cofactors of the linear part, scaled: the inverse transpose but for a factor, finite where that is not.
     cofactors: Mat3,
     /// −1 where it mirrors, else 1.
     orientation: f32,
@@ -158,30 +160,15 @@ impl Transform {
         let largest = columns.iter().map(|c| c.abs().max_element()).fold(f64::MIN_POSITIVE, f64::max);
         let [cx, cy, cz] = columns.map(|c| (c / largest).as_vec3());
         Self {
-            linear: t.matrix3.as_mat3(),
-            translation: t.translation.as_vec3(),
+            placement: Placement::new(t, &Aabb::EMPTY),
             cofactors: Mat3::from_cols(cx, cy, cz),
             orientation: if columns[2].dot(z) < 0.0 { -1.0 } else { 1.0 },
         }
-    }
-
-    fn point(&self, p: Vec3) -> Vec3 {
-        self.linear * p + self.translation
-    }
-
-    /// The scale of the rounding error of [`Self::point`] for points within `reach` of the origin.
-    fn reach(&self, reach: Vec3) -> Vec3 {
-        let Mat3 { x_axis: x, y_axis: y, z_axis: z } = self.linear;
-        Mat3::from_cols(x.abs(), y.abs(), z.abs()) * reach + self.translation.abs()
     }
 }
 
 fn interpolate(at_corners: [Vec3; 3], weights: [f32; 3]) -> Vec3 {
     at_corners[0] * weights[0] + at_corners[1] * weights[1] + at_corners[2] * weights[2]
-}
-
-fn largest(a: Vec3, b: Vec3, c: Vec3) -> Vec3 {
-    a.max(b).max(c)
 }
 
 /// The unit normal of a triangle, counter-clockwise; `otherwise` where f32 knows none.
