@@ -23,6 +23,23 @@ impl Residency {
     pub fn bytes(&self) -> u64 {
         self.held.values().sum()
     }
+
+    /// A part or tree was there when a frame needed it.
+    pub fn keep(&mut self) {
+        self.hits += 1;
+    }
+
+    /// A part or tree was not there and is now held.
+    pub fn hold(&mut self, name: PartHash, bytes: u64) {
+        self.misses += 1;
+        self.held.insert(name, bytes);
+        self.peak_bytes = self.peak_bytes.max(self.bytes());
+    }
+
+    /// Gives up a part or tree.
+    pub fn free(&mut self, name: PartHash) {
+        self.held.remove(&name);
+    }
 }
 
 /// One step of a plan.
