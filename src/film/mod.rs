@@ -1,5 +1,10 @@
 //! Film, AOVs, colour, comparison.
 
+pub mod color;
+pub mod compare;
+mod flip;
+mod quantize;
+
 use crate::scene::{Aov, AovSet};
 
 /// A linear float picture with its auxiliary pictures; rows from the top.
