@@ -23,18 +23,21 @@ pub fn gain_from_stops(stops: f32) -> f32 {
 }
 
 /// Clamps to [0, 1]; what is not a number becomes 0.
-fn unit(x: f32) -> f32 {
-    // `max` returns the other operand where one is not a number
+#[expect(
+    clippy::manual_clamp,
+    reason = "`clamp` keeps what is not a number, `max` returns its other operand"
+)]
+pub(super) fn unit(x: f32) -> f32 {
     x.max(0.0).min(1.0)
 }
 
 /// A share in [0, 1] as an integer of 8 bits, rounded to nearest; no curve.
-pub fn quantize8(x: f32) -> u8 {
+pub fn unorm8(x: f32) -> u8 {
     (f64::from(unit(x)) * 255.0).round() as u8
 }
 
 /// A share in [0, 1] as an integer of 16 bits, rounded to nearest; no curve.
-pub fn quantize16(x: f32) -> u16 {
+pub fn unorm16(x: f32) -> u16 {
     (f64::from(unit(x)) * 65535.0).round() as u16
 }
 
@@ -89,6 +92,7 @@ impl Srgb8 {
 
     /// The code of linear light: clamped to [0, 1], curve, rounded to nearest; 0 for what is not a number.
     #[inline]
+    #[expect(clippy::manual_clamp, reason = "as in `unit`")]
     pub fn code(&self, x: f32) -> u8 {
         let bits = x.max(LEAST).min(1.0).to_bits();
         let bucket = self.0[((bits >> BUCKET_SHIFT) - FIRST_BUCKET) as usize];
@@ -190,8 +194,8 @@ mod tests {
         ] {
             assert_eq!(table.code(x), code, "{x}");
             assert_eq!(srgb16(x), u16::from(code) * 257, "{x}");
-            assert_eq!(quantize8(x), code, "{x}");
-            assert_eq!(quantize16(x), u16::from(code) * 257, "{x}");
+            assert_eq!(unorm8(x), code, "{x}");
+            assert_eq!(unorm16(x), u16::from(code) * 257, "{x}");
         }
     }
 }

@@ -85,11 +85,15 @@ pub fn compare(a: &Picture, b: &Picture) -> Result<Comparison, Mismatch> {
         }
     }
     let rmse = if sums.count == 0 { 0.0 } else { (sums.squares / sums.count as f64).sqrt() };
-    let flip = match (a.linear_rgb(), b.linear_rgb()) {
+    let flip = if sums.max == 0.0 { 0.0 } else { color_flip(a, b) };
+    Ok(Comparison { max: sums.max, rmse, psnr: (rmse > 0.0).then(|| -20.0 * rmse.log10()), flip })
+}
+
+fn color_flip(a: &Picture, b: &Picture) -> f64 {
+    match (a.linear_rgb(), b.linear_rgb()) {
         (Some(x), Some(y)) => mean_flip(a.size.map(|n| n as usize), &x, &y),
         _ => 0.0,
-    };
-    Ok(Comparison { max: sums.max, rmse, psnr: (rmse > 0.0).then(|| -20.0 * rmse.log10()), flip })
+    }
 }
 
 #[derive(Default)]
@@ -127,6 +131,21 @@ fn difference(a: f32, b: f32) -> f64 {
     }
     // `min` returns 1 where the difference is not a number
     (f64::from(a) - f64::from(b)).abs().min(1.0)
+}
+
+impl Samples {
+    /// How many they are.
+    pub fn len(&self) -> usize {
+        match self {
+            Self::Float(values) => values.len(),
+            Self::Id(values) => values.len(),
+        }
+    }
+
+    /// Whether there is none.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
 }
 
 impl Picture {

@@ -4,6 +4,7 @@
 //! The filters are separable as in NVIDIA's own evaluator since its version 1.3; a sum of two Gaussians is the sum of
 //! two separable filters.
 
+use super::color::unit;
 use rayon::prelude::*;
 use std::f32::consts::PI;
 
@@ -57,7 +58,7 @@ fn xyz_from_linear([r, g, b]: [f32; 3]) -> [f32; 3] {
     [
         0.412_386_56 * r + 0.357_591_5 * g + 0.180_450_48 * b,
         0.212_636_8 * r + 0.715_183 * g + 0.072_180_2 * b,
-        0.019_330_62 * r + 0.119_197_17 * g + 0.950_372_57 * b,
+        0.019_330_62 * r + 0.119_197_17 * g + 0.950_372_6 * b,
     ]
 }
 
@@ -103,8 +104,7 @@ fn opponent_planes(rgb: &[[f32; 3]]) -> [Vec<f32>; 3] {
     let mut planes = [vec![0.0; rgb.len()], vec![0.0; rgb.len()], vec![0.0; rgb.len()]];
     let [y, cx, cz] = &mut planes;
     (y, cx, cz, rgb).into_par_iter().for_each(|(y, cx, cz, &rgb)| {
-        // `max` first: what is not a number becomes 0
-        [*y, *cx, *cz] = ycxcz_from_linear(rgb.map(|x| x.max(0.0).min(1.0)));
+        [*y, *cx, *cz] = ycxcz_from_linear(rgb.map(unit));
     });
     planes
 }

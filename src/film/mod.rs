@@ -3,7 +3,7 @@
 pub mod color;
 pub mod compare;
 mod flip;
-mod quantize;
+pub mod quantize;
 
 use crate::scene::{Aov, AovSet};
 
@@ -33,6 +33,17 @@ pub struct Aovs {
     pub albedo: Option<Vec<[f32; 3]>>,
     /// `[id.part, id.triangle]`, 0xFFFFFFFF where nothing is hit.
     pub id: Option<Vec<[u32; 2]>>,
+}
+
+impl Aovs {
+    /// Whether there is one.
+    pub fn any(&self) -> bool {
+        self.depth.is_some()
+            || self.normal.is_some()
+            || self.position.is_some()
+            || self.albedo.is_some()
+            || self.id.is_some()
+    }
 }
 
 impl Film {

@@ -1,36 +1,36 @@
-//! A film as integers: exposure, clamp, sRGB curve, round to nearest; alpha straight.
+//! Linear pixels as integers: exposure, clamp, sRGB curve, round to nearest; with alpha, colour is straight.
 
-use super::Film;
-use super::color::{Srgb8, gain_from_stops, quantize8, quantize16, srgb16};
+use super::color::{Srgb8, gain_from_stops, srgb16, unorm8, unorm16};
 
-impl Film {
-    /// Interleaved 8-bit rows from the top: RGB, or RGBA where the film has alpha; colour on the sRGB curve, not
-    /// premultiplied.
-    pub fn quantized8(&self, exposure_stops: f32) -> Vec<u8> {
-        let curve = Srgb8::table();
-        self.interleaved(exposure_stops, |x| curve.code(x), quantize8)
+/// Interleaved RGB of 8 bits on the sRGB curve; RGBA with colour no longer premultiplied where alpha is given, one
+/// value a pixel.
+pub fn quantize8(rgb: &[[f32; 3]], alpha: Option<&[f32]>, exposure_stops: f32) -> Vec<u8> {
+    let curve = Srgb8::table();
+    interleave(rgb, alpha, exposure_stops, |x| curve.code(x), unorm8)
+}
+
+/// [`quantize8`] with 16 bits.
+pub fn quantize16(rgb: &[[f32; 3]], alpha: Option<&[f32]>, exposure_stops: f32) -> Vec<u16> {
+    interleave(rgb, alpha, exposure_stops, srgb16, unorm16)
+}
+
+fn interleave<T>(
+    rgb: &[[f32; 3]],
+    alpha: Option<&[f32]>,
+    exposure_stops: f32,
+    color: impl Fn(f32) -> T,
+    share: impl Fn(f32) -> T,
+) -> Vec<T> {
+    let gain = gain_from_stops(exposure_stops);
+    let Some(alpha) = alpha else {
+        return rgb.as_flattened().iter().map(|&x| color(x * gain)).collect();
+    };
+    let mut samples = Vec::with_capacity(4 * rgb.len());
+    for (&rgb, &a) in rgb.iter().zip(alpha) {
+        let [r, g, b] = straight(rgb, a).map(|x| color(x * gain));
+        samples.extend([r, g, b, share(a)]);
     }
-
-    /// The same with 16 bits.
-    pub fn quantized16(&self, exposure_stops: f32) -> Vec<u16> {
-        self.interleaved(exposure_stops, srgb16, quantize16)
-    }
-
-    fn interleaved<T>(&self, stops: f32, color: impl Fn(f32) -> T, alpha: impl Fn(f32) -> T) -> Vec<T> {
-        let gain = gain_from_stops(stops);
-        match &self.alpha {
-            None => self.rgb.as_flattened().iter().map(|&x| color(x * gain)).collect(),
-            Some(coverage) => self
-                .rgb
-                .iter()
-                .zip(coverage)
-                .flat_map(|(&rgb, &a)| {
-                    let [r, g, b] = straight(rgb, a).map(|x| color(x * gain));
-                    [r, g, b, alpha(a)]
-                })
-                .collect(),
-        }
-    }
+    samples
 }
 
 /// Premultiplied colour without its alpha; black where there is none.
@@ -41,25 +41,21 @@ fn straight(rgb: [f32; 3], alpha: f32) -> [f32; 3] {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::AovSet;
 
     #[test]
     fn exposure_comes_before_clamp_and_curve() {
-        let mut film = Film::new([2, 1], false, AovSet::default());
-        film.rgb = vec![[0.25, 2.0, -1.0], [0.0, f32::NAN, 0.125]];
+        let rgb = [[0.25, 2.0, -1.0], [0.0, f32::NAN, 0.125]];
         // one stop: 0.5 → 188 and 0.25 → 1.055 · 0.25^(1/2.4) − 0.055 = 0.537099, · 255 = 136.96
-        assert_eq!(film.quantized8(1.0), [188, 255, 0, 0, 0, 137]);
-        assert_eq!(film.quantized8(-1.0)[1], 255);
-        assert_eq!(film.quantized16(1.0)[..3], [48192, 65535, 0]);
+        assert_eq!(quantize8(&rgb, None, 1.0), [188, 255, 0, 0, 0, 137]);
+        assert_eq!(quantize8(&rgb, None, -1.0)[1], 255);
+        assert_eq!(quantize16(&rgb, None, 1.0)[..3], [48192, 65535, 0]);
     }
 
     #[test]
     fn alpha_is_straight() {
-        let mut film = Film::new([2, 1], true, AovSet::default());
-        film.rgb = vec![[0.25, 0.125, 0.0], [0.5, 0.5, 0.5]];
-        film.alpha = Some(vec![0.5, 0.0]);
+        let (rgb, alpha) = ([[0.25, 0.125, 0.0], [0.5, 0.5, 0.5]], [0.5, 0.0]);
         // 0.25 / 0.5 = 0.5 → 188; 0.5 · 255 = 127.5 → 128; nothing is there where alpha is 0
-        assert_eq!(film.quantized8(0.0), [188, 137, 0, 128, 0, 0, 0, 0]);
-        assert_eq!(film.quantized16(0.0)[..4], [48192, 35199, 0, 32768]);
+        assert_eq!(quantize8(&rgb, Some(&alpha), 0.0), [188, 137, 0, 128, 0, 0, 0, 0]);
+        assert_eq!(quantize16(&rgb, Some(&alpha), 0.0)[..4], [48192, 35199, 0, 32768]);
     }
 }

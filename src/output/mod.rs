@@ -1,1 +1,27 @@
-//! To be written.
+//! Encoders, atomic files, records of finished frames, and pictures read back to be compared.
+//!
+//! A film becomes the bytes of its files ([`picture_files`]); [`finish`] brings them into their places, the frame's
+//! record before them. A picture file is whole or absent, and its bytes are a function of the film and the encoding.
+
+mod atomic;
+mod compare;
+mod encoding;
+mod error;
+mod exr;
+mod finish;
+mod owner;
+mod png;
+mod ppm;
+mod read;
+mod record_name;
+mod records;
+mod run_log;
+
+pub use atomic::write_atomic;
+pub use compare::{PictureComparison, PictureOutcome, compare_paths};
+pub use encoding::{Bits, Encoding, Format, PictureFile, file_names, picture_files};
+pub use error::OutputError;
+pub use finish::{clean_up, finish, foreign};
+pub use read::read_picture;
+pub use records::Records;
+pub use run_log::RunLog;

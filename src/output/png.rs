@@ -1,0 +1,33 @@
+//! PNG: the fast setting, an sRGB chunk, nothing else.
+
+use super::encoding::{Bits, Encoding};
+use crate::film::Film;
+use crate::film::quantize::{quantize8, quantize16};
+
+/// RGB or RGBA with 8 or 16 bits a channel.
+pub(super) fn encode(film: &Film, encoding: Encoding) -> Result<Vec<u8>, String> {
+    let (alpha, stops) = (film.alpha.as_deref(), encoding.exposure_stops);
+    let (depth, rows) = match encoding.bits {
+        Bits::Eight => (png::BitDepth::Eight, quantize8(&film.rgb, alpha, stops)),
+        Bits::Sixteen => (png::BitDepth::Sixteen, big_endian(&quantize16(&film.rgb, alpha, stops))),
+    };
+    let mut bytes = Vec::new();
+    let mut encoder = png::Encoder::new(&mut bytes, film.size[0], film.size[1]);
+    encoder.set_color(if film.alpha.is_some() { png::ColorType::Rgba } else { png::ColorType::Rgb });
+    encoder.set_depth(depth);
+    // a stronger compression takes fifty times as long as all the rest of writing a frame
+    encoder.set_compression(png::Compression::Fast);
+    encoder.set_source_srgb(png::SrgbRenderingIntent::Perceptual);
+    let write = || -> Result<(), png::EncodingError> {
+        let mut writer = encoder.write_header()?;
+        writer.write_image_data(&rows)?;
+        writer.finish()
+    };
+    write().map_err(|e| e.to_string())?;
+    Ok(bytes)
+}
+
+/// Samples of 16 bits as PNG and PPM store them.
+pub(super) fn big_endian(samples: &[u16]) -> Vec<u8> {
+    samples.iter().flat_map(|s| s.to_be_bytes()).collect()
+}
