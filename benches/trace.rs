@@ -45,46 +45,73 @@ fn main() {
         let scene = TracedScene::new(vec![TracedObject::new(Arc::new(tree), None)]);
         for &width in Width::available() {
             let scene = scene.clone().with_width(width);
-            trace(&scene, &camera, o.runs, &format!("{quality:?} {width:?}"));
+            for mode in [Mode::Single, Mode::Batch] {
+                trace(&scene, &camera, mode, o.runs, &format!("{quality:?} {width:?}"));
+            }
         }
     }
 }
 
-fn trace(scene: &TracedScene, camera: &Camera, runs: usize, name: &str) {
+/// How rays are handed over.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Mode {
+    /// One by one.
+    Single,
+    /// A tile at once.
+    Batch,
+}
+
+/// Pixels of a tile, a square of 4.
+const TILE: usize = 16;
+
+fn trace(scene: &TracedScene, camera: &Camera, mode: Mode, runs: usize, name: &str) {
     let [w, h] = camera.size;
-    let mut distances = vec![f32::INFINITY; w * h];
-    let mut shadowed = vec![false; w * h];
-    const BAND: usize = 4;
+    let mut distances = vec![[f32::INFINITY; TILE]; w * h / TILE];
+    let mut shadowed = vec![[false; TILE]; distances.len()];
     let (camera_ms, ()) = median(runs, || {
-        distances.par_chunks_mut(BAND * w).enumerate().for_each(|(band, row)| {
-            for (i, distance) in row.iter_mut().enumerate() {
-                let ray = Ray { origin: camera.eye, direction: camera.direction(i % w, band * BAND + i / w) };
-                *distance = scene.closest(&ray, None).map_or(f32::INFINITY, |h| h.distance);
+        distances.par_iter_mut().with_min_len(w / 4).enumerate().for_each(|(tile, distances)| {
+            let rays = camera.rays(tile);
+            if mode == Mode::Batch {
+                let mut hits = [None; TILE];
+                scene.closest_batch(&rays, &mut hits);
+                *distances = hits.map(|h| h.map_or(f32::INFINITY, |h| h.distance));
+            } else {
+                *distances = rays.map(|ray| scene.closest(&ray, None).map_or(f32::INFINITY, |h| h.distance));
             }
         });
     });
     let (shadow_ms, ()) = median(runs, || {
-        shadowed.par_chunks_mut(BAND * w).zip(distances.par_chunks(BAND * w)).enumerate().for_each(
-            |(band, (row, distances))| {
-                for (i, (shadowed, &distance)) in row.iter_mut().zip(distances).enumerate() {
-                    if distance < f32::INFINITY {
-                        let direction = camera.direction(i % w, band * BAND + i / w);
-                        let point = camera.eye + direction * distance;
+        shadowed.par_iter_mut().with_min_len(w / 4).zip(&distances).enumerate().for_each(
+            |(tile, (shadowed, distances))| {
+                let mut rays = camera.rays(tile);
+                let mut ends = [0.0; TILE];
+                let mut count = 0;
+                for i in 0..TILE {
+                    if distances[i] < f32::INFINITY {
+                        let point = rays[i].origin + rays[i].direction * distances[i];
                         let to_light = camera.light - point;
-                        let ray = Ray { origin: point + 1e-3 * to_light, direction: to_light };
-                        *shadowed = scene.occluded(&ray, 1.0 - 1e-3);
+                        rays[count] = Ray { origin: point + 1e-3 * to_light, direction: to_light };
+                        ends[count] = 1.0 - 1e-3;
+                        count += 1;
+                    }
+                }
+                if mode == Mode::Batch {
+                    scene.occluded_batch(&rays[..count], &ends[..count], &mut shadowed[..count]);
+                } else {
+                    for ((s, ray), end) in shadowed.iter_mut().zip(&rays[..count]).zip(ends) {
+                        *s = scene.occluded(ray, end);
                     }
                 }
             },
         );
     });
-    let hits = distances.iter().filter(|d| d.is_finite()).count();
+    let hits = distances.as_flattened().iter().filter(|d| d.is_finite()).count();
     println!(
-        "{name}: camera {camera_ms:.1} ms ({:.1} Mray/s), shadow {shadow_ms:.1} ms ({:.1} Mray/s), together {:.1} ms; {hits} hits, {} shadowed",
+        "{name} {mode:?}: camera {camera_ms:.1} ms ({:.1} Mray/s), shadow {shadow_ms:.1} ms ({:.1} Mray/s), together {:.1} ms; {hits} hits, {} shadowed",
         (w * h) as f64 * 1e-3 / camera_ms,
         hits as f64 * 1e-3 / shadow_ms,
         camera_ms + shadow_ms,
-        shadowed.iter().filter(|s| **s).count()
+        shadowed.as_flattened().iter().filter(|s| **s).count()
     );
 }
 
@@ -135,6 +162,13 @@ impl Camera {
         }
     }
 
+    /// The rays of a tile, row by row; the picture's size is a multiple of 4.
+    fn rays(&self, tile: usize) -> [Ray; TILE] {
+        let tiles = self.size[0] / 4;
+        let (x, y) = (tile % tiles * 4, tile / tiles * 4);
+        std::array::from_fn(|i| Ray { origin: self.eye, direction: self.direction(x + i % 4, y + i / 4) })
+    }
+
     fn direction(&self, x: usize, y: usize) -> Vec3 {
         let u = 2.0 * (x as f32 + 0.5) / self.size[0] as f32 - 1.0;
         let v = 1.0 - 2.0 * (y as f32 + 0.5) / self.size[1] as f32;
@@ -177,7 +211,8 @@ fn options() -> Option<Options> {
             "--size" => {
                 let size = words.next()?;
                 let (w, h) = size.split_once('x')?;
-                o.size = [w.parse().ok()?, h.parse().ok()?];
+                o.size =
+                    [w.parse::<usize>().ok()?, h.parse().ok()?].map(|n: usize| n.next_multiple_of(4).max(4));
             }
             "--quality" => {
                 let name = words.next()?;

@@ -7,6 +7,51 @@ use rays::{Mesh, all_hits, random_rays, soup, sphere};
 use rentix::accel::{Aggregate, BruteForce, Quality, Ray, TracedObject, TracedScene, Tree, Width, validate};
 use std::sync::Arc;
 
+/// Batches, coherent or not, give the answers of single rays.
+fn assert_batches_are_single_rays(scene: &TracedScene, rays: &[Ray], name: &str) {
+    let singles: Vec<_> = rays.iter().map(|r| scene.closest(r, None)).collect();
+    let mut hits = vec![None; rays.len()];
+    scene.closest_batch(rays, &mut hits);
+    assert_eq!(hits, singles, "{name}");
+    let ends: Vec<f32> = singles
+        .iter()
+        .zip(0..)
+        .map(|(h, i)| h.map_or(1.0, |h| if i % 2 == 0 { h.distance } else { h.distance.next_up() }))
+        .collect();
+    let mut occluded = vec![false; rays.len()];
+    scene.occluded_batch(rays, &ends, &mut occluded);
+    let expected: Vec<bool> = rays.iter().zip(&ends).map(|(r, e)| scene.occluded(r, *e)).collect();
+    assert_eq!(occluded, expected, "{name}");
+}
+
+#[test]
+fn batches_give_the_answers_of_single_rays() {
+    let mesh = soup(3000, 20);
+    let one = mesh.scene(Quality::Fastest);
+    let turned = glam::DAffine3::from_rotation_y(0.7);
+    let three = TracedScene::new(
+        [None, Some(turned), None]
+            .iter()
+            .zip(0..)
+            .map(|(t, seed)| TracedObject::new(soup(500, seed).tree(Quality::Fastest), t.as_ref()))
+            .collect(),
+    );
+    let eye = Vec3::new(0.3, 0.2, 3.0);
+    for (scene, &width) in [one, three].iter().flat_map(|s| Width::available().iter().map(move |w| (s, w))) {
+        let scene = scene.clone().with_width(width);
+        for size in [[160, 90], [5, 3], [1, 1]] {
+            assert_batches_are_single_rays(&scene, &rays::camera_rays(eye, Vec3::ZERO, 60.0, size), "camera");
+        }
+        assert_batches_are_single_rays(&scene, &random_rays(3000, 21), "random");
+        let light = Vec3::new(0.5, 4.0, 1.0);
+        let shadow: Vec<Ray> = random_rays(3000, 22)
+            .into_iter()
+            .map(|r| Ray { origin: r.origin * 0.2, direction: light - r.origin * 0.2 })
+            .collect();
+        assert_batches_are_single_rays(&scene, &shadow, "shadow");
+    }
+}
+
 fn assert_same(mesh: &Mesh, rays: &[Ray], scene: &TracedScene, name: &str) {
     let brute = BruteForce::new(&mesh.positions, &mesh.triangles);
     for ray in rays {

@@ -11,6 +11,7 @@ mod collapse;
 mod fit;
 mod lanes;
 mod origin;
+mod packet;
 mod placement;
 mod slab;
 mod stack;

@@ -1,6 +1,7 @@
 //! The traced scene of the CPU: trees, each where its object stands.
 
 use super::lanes::{Lanes8, Portable, Width};
+use super::packet::RAYS;
 use super::placement::Placement;
 use super::slab::SlabRay;
 use super::traverse::Place;
@@ -124,18 +125,81 @@ impl TracedScene {
         found
     }
 
+    /// [`Self::search`] for rays that are coherent.
+    #[inline(always)]
+    fn search_packet<L: Lanes8, const ANY: bool>(
+        &self,
+        rays: &[Ray],
+        searches: &mut [Search; RAYS],
+        found: &mut [Option<Found>; RAYS],
+    ) {
+        for (i, object) in self.objects.iter().enumerate() {
+            let mut own_rays = [rays[0]; RAYS];
+            for (own, ray) in own_rays.iter_mut().zip(rays) {
+                *own = object.own_ray(ray);
+            }
+            let own_rays = &own_rays[..rays.len()];
+            let first = object.first_primitive;
+            let note = |ray: usize, place| found[ray] = Some(Found { object: i, place });
+            if !object.tree.search_packet::<L, ANY>(own_rays, first, searches, note) {
+                for (k, ray) in own_rays.iter().enumerate() {
+                    if let Some(place) = object.tree.search::<L, ANY>(ray, first, &mut searches[k]) {
+                        found[k] = Some(Found { object: i, place });
+                        if ANY {
+                            searches[k].end();
+                        }
+                    }
+                }
+            }
+        }
+    }
+
     #[inline(always)]
     fn search_closest<L: Lanes8>(&self, ray: &Ray, after: Option<HitOrder>) -> Option<Hit> {
         let mut search = Search::after(after);
         let found = self.search::<L, false>(ray, &mut search)?;
+        Some(self.hit(ray, found, &search))
+    }
+
+    #[inline(always)]
+    fn hit(&self, ray: &Ray, found: Found, search: &Search) -> Hit {
         let object = &self.objects[found.object];
         let (triangle, corners) = object.tree.triangle_at(found.place);
-        Some(Hit {
+        Hit {
             distance: search.before.distance,
             object: found.object as u32,
             triangle,
             barycentric: ScalarRay::new(&object.own_ray(ray)).barycentric(&corners),
-        })
+        }
+    }
+
+    #[inline(always)]
+    fn search_closest_batch<L: Lanes8>(&self, rays: &[Ray], hits: &mut [Option<Hit>]) {
+        for (rays, hits) in rays.chunks(RAYS).zip(hits.chunks_mut(RAYS)) {
+            let mut searches = [Search::after(None); RAYS];
+            let mut found = [None; RAYS];
+            self.search_packet::<L, false>(rays, &mut searches, &mut found);
+            for (((hit, ray), found), search) in hits.iter_mut().zip(rays).zip(found).zip(&searches) {
+                *hit = found.map(|f| self.hit(ray, f, search));
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn search_any_batch<L: Lanes8>(&self, rays: &[Ray], ends: &[f32], occluded: &mut [bool]) {
+        for ((rays, ends), occluded) in
+            rays.chunks(RAYS).zip(ends.chunks(RAYS)).zip(occluded.chunks_mut(RAYS))
+        {
+            let mut searches = [Search::until(0.0); RAYS];
+            for (search, &end) in searches.iter_mut().zip(ends) {
+                *search = Search::until(end);
+            }
+            let mut found = [None; RAYS];
+            self.search_packet::<L, true>(rays, &mut searches, &mut found);
+            for (occluded, found) in occluded.iter_mut().zip(found) {
+                *occluded = found.is_some();
+            }
+        }
     }
 
     #[inline(always)]
@@ -157,6 +221,16 @@ mod avx2 {
     #[target_feature(enable = "avx2")]
     pub(super) fn occluded(scene: &TracedScene, ray: &Ray, end: f32) -> bool {
         scene.search_any::<Avx2>(ray, end)
+    }
+
+    #[target_feature(enable = "avx2")]
+    pub(super) fn closest_batch(scene: &TracedScene, rays: &[Ray], hits: &mut [Option<Hit>]) {
+        scene.search_closest_batch::<Avx2>(rays, hits);
+    }
+
+    #[target_feature(enable = "avx2")]
+    pub(super) fn occluded_batch(scene: &TracedScene, rays: &[Ray], ends: &[f32], occluded: &mut [bool]) {
+        scene.search_any_batch::<Avx2>(rays, ends, occluded);
     }
 }
 
@@ -182,5 +256,23 @@ impl Aggregate for TracedScene {
     fn order(&self, hit: &Hit) -> HitOrder {
         let first = self.objects.get(hit.object as usize).map_or(0, |o| o.first_primitive);
         HitOrder { distance: hit.distance, primitive: first.wrapping_add(hit.triangle) }
+    }
+
+    fn closest_batch(&self, rays: &[Ray], hits: &mut [Option<Hit>]) {
+        match self.width {
+            #[cfg(target_arch = "x86_64")]
+            // SAFETY: the width is one of those that were found available
+            Width::Avx2 => unsafe { avx2::closest_batch(self, rays, hits) },
+            _ => self.search_closest_batch::<Portable>(rays, hits),
+        }
+    }
+
+    fn occluded_batch(&self, rays: &[Ray], ends: &[f32], occluded: &mut [bool]) {
+        match self.width {
+            #[cfg(target_arch = "x86_64")]
+            // SAFETY: the width is one of those that were found available
+            Width::Avx2 => unsafe { avx2::occluded_batch(self, rays, ends, occluded) },
+            _ => self.search_any_batch::<Portable>(rays, ends, occluded),
+        }
     }
 }

@@ -11,8 +11,8 @@ use super::triangle::{ScalarRay, Search, ShearRay};
 /// Where in a tree a triangle stands.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Place {
-    block: u32,
-    lane: u32,
+    pub(crate) block: u32,
+    pub(crate) lane: u32,
 }
 
 impl Tree {
@@ -99,7 +99,7 @@ fn nearest_child<L: Lanes8>(node: &Node, slab: &SlabRay<L>, distance: f32, stack
 
 /// Tests the triangles of a leaf; gives the lane of the last one that was found.
 #[inline(always)]
-fn search_block<L: Lanes8, const ANY: bool>(
+pub(crate) fn search_block<L: Lanes8, const ANY: bool>(
     block: &Block,
     shear: &ShearRay<L>,
     scalar: &ScalarRay,

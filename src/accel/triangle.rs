@@ -74,6 +74,15 @@ impl<L: Lanes> ShearRay<L> {
     }
 }
 
+impl ShearRay<f32> {
+    /// The same ray in all lanes.
+    #[inline(always)]
+    pub(crate) fn splat<L: Lanes>(&self) -> ShearRay<L> {
+        let splat = |v: [f32; 3]| [L::splat(v[0]), L::splat(v[1]), L::splat(v[2])];
+        ShearRay { axes: self.axes, origin: splat(self.origin), shear: splat(self.shear) }
+    }
+}
+
 impl<L: Lanes> Edges<L> {
     /// Lanes whose values are all of one sign; 0 has either. Both sides of a triangle are hit.
     #[inline(always)]
@@ -124,6 +133,12 @@ impl Search {
         Self { before: HitOrder { distance: end, primitive: 0 }, ..Self::after(None) }
     }
 
+    /// Looks for nothing more.
+    #[inline(always)]
+    pub(crate) fn end(&mut self) {
+        self.before.distance = f32::NEG_INFINITY;
+    }
+
     /// Whether a candidate is what is looked for.
     #[inline(always)]
     pub(crate) fn admits(&self, candidate: HitOrder) -> bool {
@@ -140,7 +155,7 @@ fn precedes(a: HitOrder, b: HitOrder) -> bool {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct ScalarRay {
     pub(crate) slab: SlabRay<f32>,
-    shear: ShearRay<f32>,
+    pub(crate) shear: ShearRay<f32>,
 }
 
 impl ScalarRay {

@@ -1,0 +1,107 @@
+//! Rays side by side through one tree: what is coherent is decided once for all of them. Boxes are first tested against
+//! the interval of all rays, eight children at once, then a child's box against each ray. Every rounding is monotonic,
+//! so the interval's entry is not after any ray's, and the answers are those of single rays.
+
+use super::Ray;
+use super::lanes::{Lanes, Lanes8};
+use super::slab::{Interval, SlabRay};
+use super::stack::{Stack, Waiting};
+use super::traverse::{Place, search_block};
+use super::tree::{LEAF, Tree, WIDTH};
+use super::triangle::{ScalarRay, Search};
+
+/// Rays in a packet.
+pub(crate) const RAYS: usize = 2 * WIDTH;
+
+impl Tree {
+    /// [`Tree::search`] for a packet of finite rays of which the boxes' sides are met in the same order; gives false
+    /// where they are not. `note` is told the ray and the place of each triangle found.
+    #[inline(always)]
+    pub(crate) fn search_packet<L: Lanes8, const ANY: bool>(
+        &self,
+        rays: &[Ray],
+        first: u32,
+        searches: &mut [Search; RAYS],
+        mut note: impl FnMut(usize, Place),
+    ) -> bool {
+        let [first_ray, ..] = rays else { return true };
+        if self.nodes.is_empty() {
+            return true;
+        }
+        let mut scalars = [ScalarRay::new(first_ray); RAYS];
+        for (scalar, ray) in scalars.iter_mut().zip(rays).skip(1) {
+            *scalar = ScalarRay::new(ray);
+        }
+        let Some(interval) = Interval::<L>::of(&scalars) else { return false };
+        let mut ends = [f32::NEG_INFINITY; RAYS];
+        for (end, search) in ends.iter_mut().zip(&searches[..rays.len()]) {
+            *end = search.before.distance;
+        }
+        let mut last_end = ends.iter().copied().fold(f32::NEG_INFINITY, Lanes::max);
+        let [low, high] = [0, WIDTH].map(|i| std::array::from_fn(|lane| scalars[i + lane]));
+        let slabs = [SlabRay::<L>::gather(&low), SlabRay::<L>::gather(&high)];
+        let mut stack = Stack::new();
+        let mut node = 0;
+        loop {
+            self.push_children(node, &interval, last_end, &mut stack);
+            // the nearest child that waits and that some ray enters; leaves on the way are tested
+            loop {
+                let Some(waiting) = stack.pop_before(last_end) else { return true };
+                let (parent, lane) = (waiting as usize / WIDTH, waiting as usize % WIDTH);
+                let parent = &self.nodes[parent];
+                let child_box = parent.child_box(lane);
+                let mut entered = 0;
+                for (g, (slab, ends)) in slabs.iter().zip(ends.as_chunks::<WIDTH>().0).enumerate() {
+                    entered |= slab.enters(&child_box, L::load(ends)) << (g * WIDTH);
+                }
+                if entered == 0 {
+                    continue;
+                }
+                let child = parent.children[lane];
+                if child & LEAF == 0 {
+                    node = child as usize;
+                    break;
+                }
+                let block = child & !LEAF;
+                let mut is_nearer = false;
+                while entered != 0 {
+                    let i = entered.trailing_zeros() as usize % RAYS;
+                    entered &= entered - 1;
+                    let shear = scalars[i].shear.splat::<L>();
+                    let found = search_block::<L, ANY>(
+                        &self.blocks[block as usize],
+                        &shear,
+                        &scalars[i],
+                        first,
+                        &mut searches[i],
+                    );
+                    if let Some(lane) = found {
+                        note(i, Place { block, lane });
+                        if ANY {
+                            searches[i].end();
+                        }
+                        ends[i] = searches[i].before.distance;
+                        is_nearer = true;
+                    }
+                }
+                if is_nearer {
+                    last_end = ends.iter().copied().fold(f32::NEG_INFINITY, Lanes::max);
+                }
+            }
+        }
+    }
+
+    /// Adds the children that a ray may enter not after a distance, as the number of the node times eight plus the lane.
+    #[inline(always)]
+    fn push_children<L: Lanes8>(&self, node: usize, interval: &Interval<L>, end: f32, stack: &mut Stack) {
+        let (entry, exit) = interval.pass(&self.nodes[node].planes);
+        let mut entered = entry.le(L::splat(end).min(exit));
+        let entries = entry.store();
+        let floor = stack.len();
+        while entered != 0 {
+            let lane = entered.trailing_zeros() as usize % WIDTH;
+            entered &= entered - 1;
+            stack.insert(Waiting::new(entries[lane], (node * WIDTH + lane) as u32), floor);
+        }
+    }
+}
