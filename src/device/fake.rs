@@ -3,8 +3,8 @@
 
 use super::{Device, DeviceError, DeviceInfo, DeviceKind, RayCounts, Stop, Traced, UpdateCost};
 use crate::film::Film;
-use crate::plan::{Residency, Step, UpdatePlan};
-use crate::scene::{Frame, PartHash, Shot};
+use crate::plan::{Residency, Step, UpdatePlan, tree_name};
+use crate::scene::{Frame, Object, PartHash, Shot};
 use std::collections::BTreeMap;
 
 /// Bytes that a tree of the fake device takes for each triangle.
@@ -87,11 +87,7 @@ impl Device for FakeDevice {
 
     fn apply(&mut self, plan: &UpdatePlan, frame: &Frame) -> Result<UpdateCost, DeviceError> {
         self.check_lost()?;
-        let trees = plan.steps.iter().map(|step| match step {
-            Step::Build { triangles, .. } => triangles * TREE_BYTES_PER_TRIANGLE,
-            _ => 0,
-        });
-        let needed_bytes = plan.part_bytes + trees.sum::<u64>();
+        let needed_bytes = plan.needed_bytes(&self.residency, TREE_BYTES_PER_TRIANGLE);
         let is_faulty = self.faults.get(&frame.hash()) == Some(&Fault::OutOfMemory);
         if is_faulty || needed_bytes > self.info.budget_bytes {
             return Err(self.out_of_memory(needed_bytes));
@@ -123,6 +119,10 @@ impl Device for FakeDevice {
                 self.check_lost()?;
             }
             Some(Fault::OutOfMemory) | None => {}
+        }
+        let is_resident = |o: &Object| self.residency.held.contains_key(&tree_name(&o.geometry));
+        if let Some(object) = frame.objects.iter().position(|o| !is_resident(o)) {
+            return Err(DeviceError::NotResident { device: self.info.name.clone(), object });
         }
         if stop.asked() {
             return Err(DeviceError::Stopped);

@@ -28,6 +28,11 @@ pub struct FilmBand<'a> {
 }
 
 impl FilmBand<'_> {
+    /// A pixel's place in its slices, from its column and its row in the band.
+    pub fn place(&self, [x, row]: [u32; 2]) -> usize {
+        row as usize * self.width as usize + x as usize
+    }
+
     /// Whether an auxiliary picture of the ray through the pixel's centre is wanted.
     pub fn wants_center(&self) -> bool {
         self.depth.is_some() || self.normal.is_some() || self.position.is_some() || self.id.is_some()

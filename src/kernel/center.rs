@@ -2,23 +2,22 @@
 
 use super::SURFACES_MAX;
 use super::band::FilmBand;
-use super::tile::places;
 use super::world::World;
 use crate::accel::{Aggregate, Hit, Ray};
-use std::ops::Range;
 
 /// Fills depth, normal, position and id where they are wanted; pixels where nothing is seen keep what they have. Rays
-/// and their first hits stand in the order of the tile's pixels.
+/// and their first hits stand in the order of the pixels, (column, row in the band).
 pub fn fill_center<A: Aggregate>(
     aggregate: &A,
     world: &World,
     band: &mut FilmBand,
-    columns: &Range<u32>,
+    pixels: &[[u32; 2]],
     rays: &[Ray],
     hits: &[Option<Hit>],
 ) {
-    for ((place, ray), hit) in places(band, columns).zip(rays).zip(hits) {
+    for ((&pixel, ray), hit) in pixels.iter().zip(rays).zip(hits) {
         let Some(hit) = first_visible(aggregate, world, ray, *hit) else { continue };
+        let place = band.place(pixel);
         if let Some(depth) = &mut band.depth {
             depth[place] = hit.distance;
         }

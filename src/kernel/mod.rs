@@ -15,6 +15,9 @@ pub mod shade;
 pub mod tile;
 pub mod world;
 
+#[cfg(test)]
+mod tests;
+
 pub use band::{FilmBand, bands};
 pub use material::fallback;
 pub use tile::{Scene, TileBuffers, trace_tile};

@@ -110,3 +110,79 @@ fn hash(x: u32) -> u32 {
 fn unit(x: u32) -> f32 {
     (x >> 8) as f32 / 16_777_216.0
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_single_sample_lies_in_the_middle() {
+        for filter in [Filter::Box, Filter::Triangle, Filter::Gaussian] {
+            assert_eq!(place_in_pixel(filter, 0, 1, [3, 4], 5), [0.5, 0.5]);
+        }
+    }
+
+    /// A (0, k, 2)-net in base 2: each of the 2^k boxes of size 2^-a × 2^-(k−a) has one of the first 2^k points.
+    #[test]
+    fn the_first_points_are_stratified_in_every_elementary_interval() {
+        for pixel in [[0, 0], [17, 5], [1919, 1079]] {
+            for k in 0..=8 {
+                for a in 0..=k {
+                    let (columns, rows) = (1 << a, 1 << (k - a));
+                    let mut boxes = vec![0; columns * rows];
+                    for index in 0..1 << k {
+                        let [x, y] = unit_square(index, pixel, 9);
+                        boxes[(x * columns as f32) as usize * rows + (y * rows as f32) as usize] += 1;
+                    }
+                    assert!(boxes.iter().all(|&n| n == 1), "{pixel:?}, 2^{k} points, {columns} × {rows}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn pixels_and_seeds_differ_and_nothing_else_does() {
+        let at = |pixel, seed| unit_square(0, pixel, seed);
+        assert_eq!(at([3, 4], 0), at([3, 4], 0));
+        let all = [at([3, 4], 0), at([4, 3], 0), at([3, 4], 1), at([0, 0], 0), at([0, 0], 1)];
+        for (i, a) in all.iter().enumerate() {
+            assert!(all[..i].iter().all(|b| a != b));
+            assert!(a[0] != a[1], "the dimensions are scrambled alike");
+        }
+    }
+
+    /// Mean 0 from the pixel's centre; variances: box 1/12; triangle 1/6; gaussian cut off at 3σ:
+    /// σ²·(1 − 6·φ(3)/erf(3/√2)) = 0.25·(1 − 6·0.00443185/0.9973002) = 0.243334.
+    #[test]
+    fn samples_are_spread_as_the_filter_is() {
+        let count = 1 << 14;
+        for (filter, variance, reach) in [
+            (Filter::Box, 1.0 / 12.0, 0.5),
+            (Filter::Triangle, 1.0 / 6.0, 1.0),
+            (Filter::Gaussian, 0.243_334, 1.5),
+        ] {
+            for axis in 0..2 {
+                let offsets: Vec<f64> = (0..count)
+                    .map(|i| f64::from(place_in_pixel(filter, i, count, [2, 3], 0)[axis]) - 0.5)
+                    .collect();
+                let mean =
+                    |f: &dyn Fn(f64) -> f64| offsets.iter().map(|&x| f(x)).sum::<f64>() / f64::from(count);
+                assert!(mean(&|x| x).abs() < 1e-3, "{filter:?}: mean {}", mean(&|x| x));
+                assert!(
+                    (mean(&|x| x * x) - variance).abs() < 1e-3,
+                    "{filter:?}: variance {}",
+                    mean(&|x| x * x)
+                );
+                assert!(offsets.iter().all(|x| x.abs() <= reach), "{filter:?} reaches too far");
+            }
+        }
+    }
+
+    #[test]
+    fn the_inverse_of_erf_is_one() {
+        for i in -997..=997 {
+            let x = i as f32 / 1000.0;
+            assert!((libm::erf(f64::from(inverse_erf(x))) - f64::from(x)).abs() < 5e-7, "{x}");
+        }
+    }
+}

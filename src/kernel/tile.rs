@@ -66,6 +66,8 @@ struct Path {
 /// Room for a tile's rays, kept from tile to tile.
 #[derive(Debug, Default)]
 pub struct TileBuffers {
+    /// (column, row in the band).
+    pixels: Vec<[u32; 2]>,
     rays: Vec<Ray>,
     hits: Vec<Option<Hit>>,
     sums: Vec<PixelSum>,
@@ -84,15 +86,15 @@ pub fn trace_tile<A: Aggregate>(
     stopped: &dyn Fn() -> bool,
 ) -> Option<RayCounts> {
     let mut counts = RayCounts::default();
-    let pixels = columns.len() * band.rows as usize;
     let samples = scene.shot.samples;
+    list_pixels(band.rows, &columns, &mut buffers.pixels);
     buffers.sums.clear();
-    buffers.sums.resize(pixels, PixelSum::default());
+    buffers.sums.resize(buffers.pixels.len(), PixelSum::default());
     for sample in 0..samples {
         if stopped() {
             return None;
         }
-        buffers.aim(scene, band, &columns, |pixel| {
+        buffers.aim(scene, band, |pixel| {
             place_in_pixel(scene.shot.filter, sample, samples, pixel, scene.shot.seed)
         });
         buffers.trace(scene, &mut counts);
@@ -100,51 +102,41 @@ pub fn trace_tile<A: Aggregate>(
     }
     if band.wants_center() {
         if samples > 1 {
-            buffers.aim(scene, band, &columns, |_| [0.5; 2]);
+            buffers.aim(scene, band, |_| [0.5; 2]);
             buffers.trace(scene, &mut counts);
         }
-        fill_center(scene.aggregate, &scene.world, band, &columns, &buffers.rays, &buffers.hits);
+        fill_center(scene.aggregate, &scene.world, band, &buffers.pixels, &buffers.rays, &buffers.hits);
     }
-    buffers.store(scene.shot, band, &columns);
+    buffers.store(scene.shot, band);
     Some(counts)
 }
 
 /// A side of the blocks that a tile's pixels are ordered by, so that rays side by side are close.
 const BLOCK: u32 = 4;
 
-/// The pixels of a tile, in its order: (column, row in the band).
-fn pixels(rows: u32, columns: &Range<u32>) -> impl Iterator<Item = (u32, u32)> + use<> {
-    let columns = columns.clone();
-    (0..rows).step_by(BLOCK as usize).flat_map(move |top| {
-        let columns = columns.clone();
-        columns.clone().step_by(BLOCK as usize).flat_map(move |left| {
-            let right = columns.end.min(left + BLOCK);
-            (top..rows.min(top + BLOCK)).flat_map(move |row| (left..right).map(move |x| (x, row)))
-        })
-    })
-}
-
-/// The places in a band of a tile's pixels, in the tile's order.
-pub(super) fn places(band: &FilmBand, columns: &Range<u32>) -> impl Iterator<Item = usize> + use<> {
-    let width = band.width;
-    pixels(band.rows, columns).map(move |(x, row)| (row * width + x) as usize)
+/// Lists the pixels of a tile, (column, row in the band), in blocks: the order of its rays.
+fn list_pixels(rows: u32, columns: &Range<u32>, pixels: &mut Vec<[u32; 2]>) {
+    pixels.clear();
+    for top in (0..rows).step_by(BLOCK as usize) {
+        for left in columns.clone().step_by(BLOCK as usize) {
+            for row in top..rows.min(top + BLOCK) {
+                for x in left..columns.end.min(left + BLOCK) {
+                    pixels.push([x, row]);
+                }
+            }
+        }
+    }
 }
 
 impl TileBuffers {
     /// Camera rays through the given place in each pixel.
-    fn aim<A>(
-        &mut self,
-        scene: &Scene<A>,
-        band: &FilmBand,
-        columns: &Range<u32>,
-        place: impl Fn([u32; 2]) -> [f32; 2],
-    ) {
+    fn aim<A>(&mut self, scene: &Scene<A>, band: &FilmBand, place: impl Fn([u32; 2]) -> [f32; 2]) {
         self.rays.clear();
-        for (x, row) in pixels(band.rows, columns) {
+        self.rays.extend(self.pixels.iter().map(|&[x, row]| {
             let y = band.first_row + row;
             let [u, v] = place([x, y]);
-            self.rays.push(camera_ray(&scene.camera, x as f32 + u, y as f32 + v));
-        }
+            camera_ray(&scene.camera, x as f32 + u, y as f32 + v)
+        }));
     }
 
     /// The first hit of each camera ray.
@@ -232,9 +224,10 @@ impl TileBuffers {
     }
 
     /// Writes the means over the samples.
-    fn store(&self, shot: &Shot, band: &mut FilmBand, columns: &Range<u32>) {
+    fn store(&self, shot: &Shot, band: &mut FilmBand) {
         let samples = shot.samples as f32;
-        for (place, sum) in places(band, columns).zip(&self.sums) {
+        for (&pixel, sum) in self.pixels.iter().zip(&self.sums) {
+            let place = band.place(pixel);
             band.rgb[place] = (sum.rgb / samples).into();
             if let Some(alpha) = &mut band.alpha {
                 alpha[place] = 1.0 - sum.through / samples;

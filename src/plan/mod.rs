@@ -113,6 +113,17 @@ impl UpdatePlan {
     pub fn is_warm(&self) -> bool {
         self.steps.iter().any(|s| matches!(s, Step::Keep { .. }))
     }
+
+    /// Bytes that will be held after it, trees that are to be built estimated at so many bytes a triangle.
+    pub fn needed_bytes(&self, residency: &Residency, tree_bytes_per_triangle: u64) -> u64 {
+        let of_step = |step: &Step| match step {
+            Step::Free { .. } => 0,
+            Step::Keep { name } => residency.held.get(name).copied().unwrap_or(0),
+            Step::Upload { bytes, .. } => *bytes,
+            Step::Build { triangles, .. } => triangles * tree_bytes_per_triangle,
+        };
+        self.steps.iter().map(of_step).sum()
+    }
 }
 
 /// The name of the tree over a geometry: it is a function of positions and triangles alone.

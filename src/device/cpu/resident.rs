@@ -35,7 +35,7 @@ impl Resident {
         pool: &ThreadPool,
         device: &DeviceInfo,
     ) -> Result<UpdateCost, DeviceError> {
-        let needed_bytes = self.needed_bytes(plan);
+        let needed_bytes = plan.needed_bytes(&self.residency, TREE_BYTES_PER_TRIANGLE);
         if needed_bytes > device.budget_bytes {
             return Err(DeviceError::OutOfMemory {
                 device: device.name.clone(),
@@ -72,16 +72,6 @@ impl Resident {
             }
         }
         Ok(UpdateCost { uploaded_bytes, upload_ms: Some(start.ms() - update_ms), update_ms: Some(update_ms) })
-    }
-
-    /// What will be held after a plan; trees that are to be built by estimate.
-    fn needed_bytes(&self, plan: &UpdatePlan) -> u64 {
-        let trees = plan.steps.iter().map(|step| match step {
-            Step::Keep { name } => self.trees.get(name).map_or(0, |tree| tree.bytes()),
-            Step::Build { triangles, .. } => triangles * TREE_BYTES_PER_TRIANGLE,
-            Step::Free { .. } | Step::Upload { .. } => 0,
-        });
-        plan.part_bytes + trees.sum::<u64>()
     }
 
     /// The scene of a frame that is resident; else the first object whose tree is not there.
