@@ -1,6 +1,6 @@
 //! All triangles one after the other: what every tree must agree with.
 
-use super::triangle::{ScalarRay, Search, has_area};
+use super::triangle::{ScalarRay, Search, barycentric, has_area};
 use super::{Aggregate, Hit, HitOrder, Ray};
 
 /// Triangles without a tree.
@@ -30,7 +30,7 @@ impl BruteForce {
             distance: search.before.distance,
             object: 0,
             triangle: i as u32,
-            barycentric: scalar.barycentric(&self.corners[i]),
+            barycentric: barycentric(ray, &self.corners[i]),
         })
     }
 }

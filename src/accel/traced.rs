@@ -1,12 +1,12 @@
 //! The traced scene of the CPU: trees, each where its object stands.
 
+use super::interval::RAYS;
 use super::lanes::{Lanes8, Portable, Width};
-use super::packet::RAYS;
 use super::placement::Placement;
 use super::slab::SlabRay;
 use super::traverse::Place;
 use super::tree::Tree;
-use super::triangle::{ScalarRay, Search};
+use super::triangle::{Search, barycentric};
 use super::{Aggregate, Hit, HitOrder, Ray};
 use crate::math::DAffine3;
 use std::sync::Arc;
@@ -169,7 +169,7 @@ impl TracedScene {
             distance: search.before.distance,
             object: found.object as u32,
             triangle,
-            barycentric: ScalarRay::new(&object.own_ray(ray)).barycentric(&corners),
+            barycentric: barycentric(&object.own_ray(ray), &corners),
         }
     }
 

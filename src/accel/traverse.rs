@@ -6,7 +6,7 @@ use super::lanes::Lanes8;
 use super::slab::SlabRay;
 use super::stack::{Stack, Waiting};
 use super::tree::{Block, LEAF, Node, Tree};
-use super::triangle::{ScalarRay, Search, ShearRay};
+use super::triangle::{Search, ShearRay, distance_in_plane};
 
 /// Where in a tree a triangle stands.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -36,7 +36,7 @@ impl Tree {
         let mut next = nearest_child(self.nodes.first()?, &slab, search.before.distance, &mut stack);
         // most rays of many a picture end here
         next?;
-        let scalar = ScalarRay::new(ray);
+        let scalar_slab = SlabRay::new(ray);
         let shear = ShearRay::<L>::new(ray);
         let mut found = None;
         loop {
@@ -53,7 +53,7 @@ impl Tree {
             }
             let block = child & !LEAF;
             if let Some(lane) =
-                search_block::<L, ANY>(&self.blocks[block as usize], &shear, &scalar, first, search)
+                search_block::<L, ANY>(&self.blocks[block as usize], &shear, &scalar_slab, first, search)
             {
                 found = Some(Place { block, lane });
                 if ANY {
@@ -102,7 +102,7 @@ fn nearest_child<L: Lanes8>(node: &Node, slab: &SlabRay<L>, distance: f32, stack
 pub(crate) fn search_block<L: Lanes8, const ANY: bool>(
     block: &Block,
     shear: &ShearRay<L>,
-    scalar: &ScalarRay,
+    slab: &SlabRay<f32>,
     first: u32,
     search: &mut Search,
 ) -> Option<u32> {
@@ -123,7 +123,7 @@ pub(crate) fn search_block<L: Lanes8, const ANY: bool>(
     while inside != 0 {
         let lane = inside.trailing_zeros() as usize & 7;
         inside &= inside - 1;
-        let Some(distance) = scalar.distance_in_plane(&block.corners_of(lane), t[lane]) else { continue };
+        let Some(distance) = distance_in_plane(slab, &block.corners_of(lane), t[lane]) else { continue };
         let candidate = HitOrder { distance, primitive: first.wrapping_add(block.triangles[lane]) };
         if search.admits(candidate) {
             found = Some(lane as u32);

@@ -81,6 +81,12 @@ impl ShearRay<f32> {
         let splat = |v: [f32; 3]| [L::splat(v[0]), L::splat(v[1]), L::splat(v[2])];
         ShearRay { axes: self.axes, origin: splat(self.origin), shear: splat(self.shear) }
     }
+
+    #[inline(always)]
+    fn edges_of(&self, corners: &[[f32; 3]; 3]) -> Edges<f32> {
+        let [a, b, c] = corners.map(|p| self.axes.map(|k| p[k]));
+        self.edges(a, b, c)
+    }
 }
 
 impl<L: Lanes> Edges<L> {
@@ -151,45 +157,39 @@ fn precedes(a: HitOrder, b: HitOrder) -> bool {
     a.distance < b.distance || (a.distance == b.distance && a.primitive < b.primitive)
 }
 
-/// A ray against one triangle at a time: the reference, and what ends every traversal.
+/// A ray against one triangle at a time: the reference.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct ScalarRay {
-    pub(crate) slab: SlabRay<f32>,
-    pub(crate) shear: ShearRay<f32>,
+    slab: SlabRay<f32>,
+    shear: ShearRay<f32>,
 }
 
 impl ScalarRay {
-    #[inline(always)]
     pub(crate) fn new(ray: &Ray) -> Self {
         Self { slab: SlabRay::new(ray), shear: ShearRay::new(ray) }
     }
 
-    #[inline(always)]
-    fn edges(&self, corners: &[[f32; 3]; 3]) -> Edges<f32> {
-        let [a, b, c] = corners.map(|p| self.shear.axes.map(|k| p[k]));
-        self.shear.edges(a, b, c)
-    }
-
     /// The canonical distance of a triangle that has area; None where it is not hit.
     pub(crate) fn distance(&self, corners: &[[f32; 3]; 3]) -> Option<f32> {
-        let edges = self.edges(corners);
+        let edges = self.shear.edges_of(corners);
         if edges.inside() == 0 {
             return None;
         }
         let t = self.shear.plane(&edges);
-        if t > 0.0 { self.distance_in_plane(corners, t) } else { None }
+        if t > 0.0 { distance_in_plane(&self.slab, corners, t) } else { None }
     }
+}
 
-    /// The canonical distance of a triangle whose plane is hit inside it at t.
-    #[inline(always)]
-    pub(crate) fn distance_in_plane(&self, corners: &[[f32; 3]; 3], t: f32) -> Option<f32> {
-        self.slab.entry(&Aabb::own(corners)).map(|entry| Lanes::max(t, entry))
-    }
+/// The canonical distance of a triangle whose plane is hit inside it at t.
+#[inline(always)]
+pub(crate) fn distance_in_plane(slab: &SlabRay<f32>, corners: &[[f32; 3]; 3], t: f32) -> Option<f32> {
+    slab.entry(&Aabb::own(corners)).map(|entry| Lanes::max(t, entry))
+}
 
-    /// Weights of the second and third corner of a triangle that is hit.
-    pub(crate) fn barycentric(&self, corners: &[[f32; 3]; 3]) -> [f32; 2] {
-        let edges = self.edges(corners);
-        let det = edges.determinant();
-        [edges.values[1] / det, edges.values[2] / det]
-    }
+/// Weights of the second and third corner of a triangle that a ray hits.
+#[inline(always)]
+pub(crate) fn barycentric(ray: &Ray, corners: &[[f32; 3]; 3]) -> [f32; 2] {
+    let edges = ShearRay::<f32>::new(ray).edges_of(corners);
+    let det = edges.determinant();
+    [edges.values[1] / det, edges.values[2] / det]
 }
