@@ -74,8 +74,8 @@ impl<L: Lanes8> PacketSlabs<L> {
     #[inline(always)]
     pub(crate) fn ray(&self, i: usize) -> SlabRay<f32> {
         SlabRay {
-            origin: self.origin.map(|axis| axis[i]),
-            inverse: self.inverse.map(|axis| axis[i]),
+            origin: [0, 1, 2].map(|k| self.origin[k][i]),
+            inverse: [0, 1, 2].map(|k| self.inverse[k][i]),
             near_side: self.interval.near_side,
         }
     }

@@ -6,20 +6,20 @@ use super::Ray;
 use super::interval::{Interval, PacketSlabs, RAYS, greatest};
 use super::lanes::Lanes8;
 use super::stack::{Stack, Waiting};
-use super::traverse::{Place, search_block};
+use super::traverse::{Found, search_block};
 use super::tree::{LEAF, Tree, WIDTH};
 use super::triangle::{Search, ShearRay};
 
 impl Tree {
     /// [`Tree::search`] for a packet of finite rays of which the boxes' sides are met in the same order; gives false
-    /// where they are not. `note` is told the ray and the place of each triangle found.
+    /// where they are not. `note` is told the ray and the triangle, each time one is found.
     #[inline(always)]
     pub(crate) fn search_packet<L: Lanes8, const ANY: bool>(
         &self,
         rays: &[Ray],
         first: u32,
         searches: &mut [Search; RAYS],
-        mut note: impl FnMut(usize, Place),
+        mut note: impl FnMut(usize, Found),
     ) -> bool {
         let Some(slabs) = PacketSlabs::<L>::new(rays) else { return false };
         let mut ends = [f32::NEG_INFINITY; RAYS];
@@ -55,21 +55,15 @@ impl Tree {
                 self.push_children(child as usize, &slabs.interval, last_end, &mut stack);
                 continue;
             }
-            let block = child & !LEAF;
+            let block = &self.blocks[(child & !LEAF) as usize];
             let mut is_nearer = false;
             while entered != 0 {
                 let i = entered.trailing_zeros() as usize % RAYS;
                 entered &= entered - 1;
                 let shear = shears[i].splat::<L>();
-                let found = search_block::<L, ANY>(
-                    &self.blocks[block as usize],
-                    &shear,
-                    &slabs.ray(i),
-                    first,
-                    &mut searches[i],
-                );
-                if let Some(lane) = found {
-                    note(i, Place { block, lane });
+                let found = search_block::<L, ANY>(block, &shear, || slabs.ray(i), first, &mut searches[i]);
+                if let Some(found) = found {
+                    note(i, found);
                     if ANY {
                         searches[i].end();
                     }

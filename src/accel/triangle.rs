@@ -81,12 +81,6 @@ impl ShearRay<f32> {
         let splat = |v: [f32; 3]| [L::splat(v[0]), L::splat(v[1]), L::splat(v[2])];
         ShearRay { axes: self.axes, origin: splat(self.origin), shear: splat(self.shear) }
     }
-
-    #[inline(always)]
-    fn edges_of(&self, corners: &[[f32; 3]; 3]) -> Edges<f32> {
-        let [a, b, c] = corners.map(|p| self.axes.map(|k| p[k]));
-        self.edges(a, b, c)
-    }
 }
 
 impl<L: Lanes> Edges<L> {
@@ -96,6 +90,13 @@ impl<L: Lanes> Edges<L> {
         let [u, v, w] = self.values;
         let zero = L::splat(0.0);
         zero.le(u.min(v.min(w))) | u.max(v.max(w)).le(zero)
+    }
+
+    /// Weights of the second and third corner.
+    #[inline(always)]
+    pub(crate) fn barycentric(&self) -> [L; 2] {
+        let det = self.determinant();
+        [self.values[1].div(det), self.values[2].div(det)]
     }
 
     #[inline(always)]
@@ -169,14 +170,16 @@ impl ScalarRay {
         Self { slab: SlabRay::new(ray), shear: ShearRay::new(ray) }
     }
 
-    /// The canonical distance of a triangle that has area; None where it is not hit.
-    pub(crate) fn distance(&self, corners: &[[f32; 3]; 3]) -> Option<f32> {
-        let edges = self.shear.edges_of(corners);
+    /// The canonical distance of a triangle that has area, and the weights of its second and third corner; None where
+    /// it is not hit.
+    pub(crate) fn hit(&self, corners: &[[f32; 3]; 3]) -> Option<(f32, [f32; 2])> {
+        let [a, b, c] = corners.map(|p| self.shear.axes.map(|k| p[k]));
+        let edges = self.shear.edges(a, b, c);
         if edges.inside() == 0 {
             return None;
         }
         let t = self.shear.plane(&edges);
-        if t > 0.0 { distance_in_plane(&self.slab, corners, t) } else { None }
+        if t > 0.0 { Some((distance_in_plane(&self.slab, corners, t)?, edges.barycentric())) } else { None }
     }
 }
 
@@ -184,12 +187,4 @@ impl ScalarRay {
 #[inline(always)]
 pub(crate) fn distance_in_plane(slab: &SlabRay<f32>, corners: &[[f32; 3]; 3], t: f32) -> Option<f32> {
     slab.entry(&Aabb::own(corners)).map(|entry| Lanes::max(t, entry))
-}
-
-/// Weights of the second and third corner of a triangle that a ray hits.
-#[inline(always)]
-pub(crate) fn barycentric(ray: &Ray, corners: &[[f32; 3]; 3]) -> [f32; 2] {
-    let edges = ShearRay::<f32>::new(ray).edges_of(corners);
-    let det = edges.determinant();
-    [edges.values[1] / det, edges.values[2] / det]
 }
