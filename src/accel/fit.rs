@@ -50,7 +50,7 @@ impl Tree {
 impl Node {
     /// One child's box.
     pub(crate) fn child_box(&self, lane: usize) -> Aabb {
-        let [min, max] = self.planes.map(|side| side.map(|axis| axis[lane]));
+        let [min, max] = [0, 1].map(|side| [0, 1, 2].map(|axis| self.planes[side][axis][lane]));
         Aabb { min, max }
     }
 

@@ -42,7 +42,8 @@ impl Block {
     /// The corners of one triangle.
     #[inline(always)]
     pub(crate) fn corners_of(&self, lane: usize) -> [[f32; 3]; 3] {
-        self.corners.map(|corner| corner.map(|axis| axis[lane]))
+        // by place, as mapping the arrays themselves would copy them whole
+        [0, 1, 2].map(|corner| [0, 1, 2].map(|axis| self.corners[corner][axis][lane]))
     }
 }
 

@@ -92,6 +92,13 @@ impl<L: Lanes> Edges<L> {
         zero.le(u.min(v.min(w))) | u.max(v.max(w)).le(zero)
     }
 
+    /// Weights of the second and third corner.
+    #[inline(always)]
+    pub(crate) fn barycentric(&self) -> [L; 2] {
+        let det = self.determinant();
+        [self.values[1].div(det), self.values[2].div(det)]
+    }
+
     #[inline(always)]
     fn determinant(&self) -> L {
         let [u, v, w] = self.values;
@@ -151,45 +158,33 @@ fn precedes(a: HitOrder, b: HitOrder) -> bool {
     a.distance < b.distance || (a.distance == b.distance && a.primitive < b.primitive)
 }
 
-/// A ray against one triangle at a time: the reference, and what ends every traversal.
+/// A ray against one triangle at a time: the reference.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct ScalarRay {
-    pub(crate) slab: SlabRay<f32>,
-    pub(crate) shear: ShearRay<f32>,
+    slab: SlabRay<f32>,
+    shear: ShearRay<f32>,
 }
 
 impl ScalarRay {
-    #[inline(always)]
     pub(crate) fn new(ray: &Ray) -> Self {
         Self { slab: SlabRay::new(ray), shear: ShearRay::new(ray) }
     }
 
-    #[inline(always)]
-    fn edges(&self, corners: &[[f32; 3]; 3]) -> Edges<f32> {
+    /// The canonical distance of a triangle that has area, and the weights of its second and third corner; None where
+    /// it is not hit.
+    pub(crate) fn hit(&self, corners: &[[f32; 3]; 3]) -> Option<(f32, [f32; 2])> {
         let [a, b, c] = corners.map(|p| self.shear.axes.map(|k| p[k]));
-        self.shear.edges(a, b, c)
-    }
-
-    /// The canonical distance of a triangle that has area; None where it is not hit.
-    pub(crate) fn distance(&self, corners: &[[f32; 3]; 3]) -> Option<f32> {
-        let edges = self.edges(corners);
+        let edges = self.shear.edges(a, b, c);
         if edges.inside() == 0 {
             return None;
         }
         let t = self.shear.plane(&edges);
-        if t > 0.0 { self.distance_in_plane(corners, t) } else { None }
+        if t > 0.0 { Some((distance_in_plane(&self.slab, corners, t)?, edges.barycentric())) } else { None }
     }
+}
 
-    /// The canonical distance of a triangle whose plane is hit inside it at t.
-    #[inline(always)]
-    pub(crate) fn distance_in_plane(&self, corners: &[[f32; 3]; 3], t: f32) -> Option<f32> {
-        self.slab.entry(&Aabb::own(corners)).map(|entry| Lanes::max(t, entry))
-    }
-
-    /// Weights of the second and third corner of a triangle that is hit.
-    pub(crate) fn barycentric(&self, corners: &[[f32; 3]; 3]) -> [f32; 2] {
-        let edges = self.edges(corners);
-        let det = edges.determinant();
-        [edges.values[1] / det, edges.values[2] / det]
-    }
+/// The canonical distance of a triangle whose plane is hit inside it at t.
+#[inline(always)]
+pub(crate) fn distance_in_plane(slab: &SlabRay<f32>, corners: &[[f32; 3]; 3], t: f32) -> Option<f32> {
+    slab.entry(&Aabb::own(corners)).map(|entry| Lanes::max(t, entry))
 }
