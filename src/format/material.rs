@@ -47,6 +47,8 @@ pub(super) struct Loader<'a> {
     pub inputs: Vec<PathBuf>,
     /// Their bytes.
     pub bytes_read: u64,
+    /// What was named and not found, each as a sentence.
+    pub missing: Vec<String>,
 }
 
 impl<'a> Loader<'a> {
@@ -59,6 +61,7 @@ impl<'a> Loader<'a> {
             contents: HashMap::new(),
             inputs: Vec::new(),
             bytes_read: 0,
+            missing: Vec::new(),
         }
     }
 
@@ -111,6 +114,7 @@ impl<'a> Loader<'a> {
                     "material library `{}` is not found; its materials are the default",
                     shown(&name)
                 );
+                self.missing.push(format!("{}: {text}", self.obj.display()));
                 warnings.add(Some(self.obj), None, text);
                 continue;
             };
@@ -148,6 +152,25 @@ impl<'a> Loader<'a> {
         Ok(parsed.materials.into_iter().map(|(name, given)| (name, entry(given))).collect())
     }
 
+    /// The files behind `mtllib` statements and the options' file, and the maps of all their materials.
+    pub(super) fn named_files(mut self, libraries: &[&[u8]]) -> Vec<PathBuf> {
+        let mut unheard = Warnings::default();
+        for statement in libraries {
+            self.read_libraries(statement, &mut unheard);
+        }
+        if let Some(file) = &self.options.materials_file {
+            let materials = self.read_library(file, &mut unheard).unwrap_or_default();
+            self.entries.extend(materials);
+        }
+        let mut files = std::mem::take(&mut self.inputs);
+        for entry in self.entries.values() {
+            let said_in = entry.file.as_deref().unwrap_or(self.obj);
+            let folders = [folder(said_in), folder(self.obj)];
+            files.extend(entry.given.maps.iter().filter_map(|(_, name)| self.lookup.find(name, &folders)));
+        }
+        files
+    }
+
     fn note_input(&mut self, path: &Path, bytes: usize) {
         self.bytes_read += bytes as u64;
         if !self.inputs.iter().any(|input| input == path) {
@@ -172,6 +195,7 @@ impl<'a> Loader<'a> {
         let content = path.as_deref().and_then(|path| self.content(path));
         if content.is_none() {
             let text = format!("{word} `{}` is not found; the constant is used", shown(name));
+            self.missing.push(format!("{}: {text}", said_in.display()));
             warnings.add(Some(said_in), None, text);
         }
         MapFile { word: word.to_owned(), path: path.filter(|_| content.is_some()), content }

@@ -63,6 +63,8 @@ pub struct Loaded {
     pub parse_ms: f64,
     /// What is wrong but does not stop the frame.
     pub warnings: Warnings,
+    /// Libraries and maps that were named and not found, each as a sentence.
+    pub missing: Vec<String>,
 }
 
 /// Reads an OBJ and all that it refers to.
@@ -86,6 +88,7 @@ pub fn load_obj(path: &Path, options: &ReadOptions) -> Result<Loaded, FormatErro
         read_ms,
         parse_ms: watch.ms(),
         warnings,
+        missing: loader.missing,
     })
 }
 
@@ -93,4 +96,13 @@ pub fn load_obj(path: &Path, options: &ReadOptions) -> Result<Loaded, FormatErro
 pub fn scan_bounds(path: &Path) -> Result<Bounds, FormatError> {
     let bytes = text::read(path)?;
     Ok(obj::bounds(&Text::new(&bytes, path)?))
+}
+
+/// The libraries that an OBJ names and the maps of all their materials, as far as they are there. The shape is not
+/// read, and what cannot be read names nothing: this is for what must not be written over.
+pub fn named_files(path: &Path, materials_file: Option<&Path>) -> Vec<PathBuf> {
+    let Ok(bytes) = text::read(path) else { return Vec::new() };
+    let Ok(text) = Text::new(&bytes, path) else { return Vec::new() };
+    let options = ReadOptions { materials_file: materials_file.map(Path::to_path_buf), ..ReadOptions::default() };
+    material::Loader::new(path, &options).named_files(&obj::library_statements(&text))
 }

@@ -14,7 +14,7 @@ mod triangulate;
 use super::ReadOptions;
 use super::error::FormatError;
 use super::material::Library;
-use super::text::{Tally, Text, shown};
+use super::text::{Tally, Text, first_word, is_line_end, line_end, shown, trimmed, without_comment};
 use crate::math::{Bounds, DVec3};
 use crate::scene::Geometry;
 use crate::warning::Warnings;
@@ -63,6 +63,19 @@ pub(super) fn bounds(text: &Text) -> Bounds {
         }
     });
     Bounds { min: DVec3::from(min.map(f64::from)), max: DVec3::from(max.map(f64::from)) }
+}
+
+/// What stands behind each `mtllib`, found without reading the rest.
+pub(super) fn library_statements<'t>(text: &'t Text<'_>) -> Vec<&'t [u8]> {
+    let bytes: &[u8] = &text.joined;
+    memchr::memmem::find_iter(bytes, b"mtllib")
+        .filter_map(|at| {
+            let starts = bytes[..at].iter().rposition(|&b| is_line_end(b)).map_or(0, |i| i + 1);
+            let line = trimmed(without_comment(&bytes[starts..line_end(bytes, at)]));
+            let (word, rest) = first_word(line);
+            (word == b"mtllib").then(|| trimmed(rest))
+        })
+        .collect()
 }
 
 impl<'a> Lines<'a> {
