@@ -19,19 +19,14 @@ impl BruteForce {
         let scalar = ScalarRay::new(ray);
         let mut found = None;
         for (i, corners) in self.corners.iter().enumerate().filter(|(_, c)| has_area(c)) {
-            let Some(distance) = scalar.distance(corners) else { continue };
+            let Some((distance, barycentric)) = scalar.hit(corners) else { continue };
             let candidate = HitOrder { distance, primitive: i as u32 };
             if search.admits(candidate) {
                 search.before = candidate;
-                found = Some(i);
+                found = Some(Hit { distance, object: 0, triangle: i as u32, barycentric });
             }
         }
-        found.map(|i| Hit {
-            distance: search.before.distance,
-            object: 0,
-            triangle: i as u32,
-            barycentric: scalar.barycentric(&self.corners[i]),
-        })
+        found
     }
 }
 

@@ -9,6 +9,7 @@ mod binary;
 mod brute;
 mod collapse;
 mod fit;
+mod interval;
 mod lanes;
 mod origin;
 mod packet;

@@ -3,90 +3,76 @@
 //! so the interval's entry is not after any ray's, and the answers are those of single rays.
 
 use super::Ray;
-use super::lanes::{Lanes, Lanes8};
-use super::slab::{Interval, SlabRay};
+use super::interval::{Interval, PacketSlabs, RAYS, greatest};
+use super::lanes::Lanes8;
 use super::stack::{Stack, Waiting};
-use super::traverse::{Place, search_block};
+use super::traverse::{Found, search_block};
 use super::tree::{LEAF, Tree, WIDTH};
-use super::triangle::{ScalarRay, Search};
-
-/// Rays in a packet.
-pub(crate) const RAYS: usize = 2 * WIDTH;
+use super::triangle::{Search, ShearRay};
 
 impl Tree {
     /// [`Tree::search`] for a packet of finite rays of which the boxes' sides are met in the same order; gives false
-    /// where they are not. `note` is told the ray and the place of each triangle found.
+    /// where they are not. `note` is told the ray and the triangle, each time one is found.
     #[inline(always)]
     pub(crate) fn search_packet<L: Lanes8, const ANY: bool>(
         &self,
         rays: &[Ray],
         first: u32,
         searches: &mut [Search; RAYS],
-        mut note: impl FnMut(usize, Place),
+        mut note: impl FnMut(usize, Found),
     ) -> bool {
-        let [first_ray, ..] = rays else { return true };
-        if self.nodes.is_empty() {
-            return true;
-        }
-        let mut scalars = [ScalarRay::new(first_ray); RAYS];
-        for (scalar, ray) in scalars.iter_mut().zip(rays).skip(1) {
-            *scalar = ScalarRay::new(ray);
-        }
-        let Some(interval) = Interval::<L>::of(&scalars) else { return false };
+        let Some(slabs) = PacketSlabs::<L>::new(rays) else { return false };
         let mut ends = [f32::NEG_INFINITY; RAYS];
         for (end, search) in ends.iter_mut().zip(&searches[..rays.len()]) {
             *end = search.before.distance;
         }
-        let mut last_end = ends.iter().copied().fold(f32::NEG_INFINITY, Lanes::max);
-        let [low, high] = [0, WIDTH].map(|i| std::array::from_fn(|lane| scalars[i + lane]));
-        let slabs = [SlabRay::<L>::gather(&low), SlabRay::<L>::gather(&high)];
+        let mut last_end = greatest::<L>(&ends);
         let mut stack = Stack::new();
-        let mut node = 0;
+        if !self.nodes.is_empty() {
+            self.push_children(0, &slabs.interval, last_end, &mut stack);
+        }
+        if stack.len() == 0 {
+            return true;
+        }
+        let mut shears = [ShearRay::<f32>::new(&rays[0]); RAYS];
+        for (shear, ray) in shears.iter_mut().zip(rays).skip(1) {
+            *shear = ShearRay::new(ray);
+        }
         loop {
-            self.push_children(node, &interval, last_end, &mut stack);
-            // the nearest child that waits and that some ray enters; leaves on the way are tested
-            loop {
-                let Some(waiting) = stack.pop_before(last_end) else { return true };
-                let (parent, lane) = (waiting as usize / WIDTH, waiting as usize % WIDTH);
-                let parent = &self.nodes[parent];
-                let child_box = parent.child_box(lane);
-                let mut entered = 0;
-                for (g, (slab, ends)) in slabs.iter().zip(ends.as_chunks::<WIDTH>().0).enumerate() {
-                    entered |= slab.enters(&child_box, L::load(ends)) << (g * WIDTH);
-                }
-                if entered == 0 {
-                    continue;
-                }
-                let child = parent.children[lane];
-                if child & LEAF == 0 {
-                    node = child as usize;
-                    break;
-                }
-                let block = child & !LEAF;
-                let mut is_nearer = false;
-                while entered != 0 {
-                    let i = entered.trailing_zeros() as usize % RAYS;
-                    entered &= entered - 1;
-                    let shear = scalars[i].shear.splat::<L>();
-                    let found = search_block::<L, ANY>(
-                        &self.blocks[block as usize],
-                        &shear,
-                        &scalars[i],
-                        first,
-                        &mut searches[i],
-                    );
-                    if let Some(lane) = found {
-                        note(i, Place { block, lane });
-                        if ANY {
-                            searches[i].end();
-                        }
-                        ends[i] = searches[i].before.distance;
-                        is_nearer = true;
+            let Some(waiting) = stack.pop_before(last_end) else { return true };
+            let (parent, lane) = (waiting as usize / WIDTH, waiting as usize % WIDTH);
+            let parent = &self.nodes[parent];
+            let child_box = parent.child_box(lane);
+            let mut entered = 0_u64;
+            for (g, (slab, ends)) in slabs.groups.iter().zip(ends.as_chunks::<WIDTH>().0).enumerate() {
+                entered |= u64::from(slab.enters(&child_box, L::load(ends))) << (g * WIDTH);
+            }
+            if entered == 0 {
+                continue;
+            }
+            let child = parent.children[lane];
+            if child & LEAF == 0 {
+                self.push_children(child as usize, &slabs.interval, last_end, &mut stack);
+                continue;
+            }
+            let block = &self.blocks[(child & !LEAF) as usize];
+            let mut is_nearer = false;
+            while entered != 0 {
+                let i = entered.trailing_zeros() as usize % RAYS;
+                entered &= entered - 1;
+                let shear = shears[i].splat::<L>();
+                let found = search_block::<L, ANY>(block, &shear, || slabs.ray(i), first, &mut searches[i]);
+                if let Some(found) = found {
+                    note(i, found);
+                    if ANY {
+                        searches[i].end();
                     }
+                    ends[i] = searches[i].before.distance;
+                    is_nearer = true;
                 }
-                if is_nearer {
-                    last_end = ends.iter().copied().fold(f32::NEG_INFINITY, Lanes::max);
-                }
+            }
+            if is_nearer {
+                last_end = greatest::<L>(&ends);
             }
         }
     }

@@ -2,13 +2,12 @@
 //! another is never entered later nor missed (every step is monotonic in the planes).
 
 use super::Ray;
-use super::lanes::{Lanes, Lanes8};
-use super::triangle::ScalarRay;
+use super::lanes::{Lanes, per_axis};
 
 /// Factor on the exit of a box. Let u = 2⁻²⁴. The slab test's own roundings need 1 + 6u (Ize, "Robust BVH Ray
 /// Traversal", 2013: 1 + 2γ₃); the edge test sees a vertex displaced by up to 4u of its distance from the origin,
 /// which needs 8u more. The part of that displacement that is due to the triangle's size is in the own box's margin.
-const EXIT_FACTOR: f32 = 1.0 + 1.0 / 1048576.0;
+pub(crate) const EXIT_FACTOR: f32 = 1.0 + 1.0 / 1048576.0;
 
 /// Direction components below this count as this, with their sign.
 const LEAST_DIRECTION: f32 = 1e-20;
@@ -36,8 +35,8 @@ impl Aabb {
     #[must_use]
     pub fn union(&self, other: &Self) -> Self {
         Self {
-            min: std::array::from_fn(|k| Lanes::min(self.min[k], other.min[k])),
-            max: std::array::from_fn(|k| Lanes::max(self.max[k], other.max[k])),
+            min: per_axis(|k| Lanes::min(self.min[k], other.min[k])),
+            max: per_axis(|k| Lanes::max(self.max[k], other.max[k])),
         }
     }
 
@@ -56,19 +55,34 @@ impl Aabb {
     #[inline(always)]
     pub fn own(corners: &[[f32; 3]; 3]) -> Self {
         let [a, b, c] = corners;
-        let min: [f32; 3] = std::array::from_fn(|k| Lanes::min(a[k], Lanes::min(b[k], c[k])));
-        let max: [f32; 3] = std::array::from_fn(|k| Lanes::max(a[k], Lanes::max(b[k], c[k])));
+        let min = per_axis(|k| Lanes::min(a[k], Lanes::min(b[k], c[k])));
+        let max = per_axis(|k| Lanes::max(a[k], Lanes::max(b[k], c[k])));
         let extent = Lanes::max(max[0] - min[0], Lanes::max(max[1] - min[1], max[2] - min[2]));
         let margin = extent * (8.0 * f32::EPSILON);
-        Self { min: min.map(|x| (x - margin).next_down()), max: max.map(|x| (x + margin).next_up()) }
+        Self { min: per_axis(|k| -next_up(margin - min[k])), max: per_axis(|k| next_up(max[k] + margin)) }
     }
+}
+
+/// The next greater float; what is not finite stays. Like `f32::next_up`, but without branches.
+#[inline(always)]
+fn next_up(x: f32) -> f32 {
+    let bits = (x + 0.0).to_bits();
+    let next = if bits >> 31 == 0 { bits + 1 } else { bits - 1 };
+    if x.is_finite() { f32::from_bits(next) } else { x }
+}
+
+/// 1 / a direction's component; what is below [`LEAST_DIRECTION`] counts as that.
+#[inline(always)]
+pub(crate) fn inverse(d: f32) -> f32 {
+    1.0 / if d.abs() < LEAST_DIRECTION { LEAST_DIRECTION.copysign(d) } else { d }
 }
 
 /// A ray as the slab test wants it.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct SlabRay<L> {
-    origin: [L; 3],
-    inverse: [L; 3],
+    pub(crate) origin: [L; 3],
+    /// 1 / direction, see [`inverse`].
+    pub(crate) inverse: [L; 3],
     /// For each axis the side that is entered first: 0 the lesser plane, 1 the greater.
     pub(crate) near_side: [usize; 3],
 }
@@ -77,15 +91,21 @@ impl<L: Lanes> SlabRay<L> {
     #[inline(always)]
     pub(crate) fn new(ray: &Ray) -> Self {
         let o = ray.origin.to_array();
-        let i = ray
-            .direction
-            .to_array()
-            .map(|d| 1.0 / if d.abs() < LEAST_DIRECTION { LEAST_DIRECTION.copysign(d) } else { d });
+        let d = ray.direction.to_array();
+        let i = per_axis(|k| inverse(d[k]));
         Self {
-            origin: [L::splat(o[0]), L::splat(o[1]), L::splat(o[2])],
-            inverse: [L::splat(i[0]), L::splat(i[1]), L::splat(i[2])],
-            near_side: i.map(|x| usize::from(x < 0.0)),
+            origin: per_axis(|k| L::splat(o[k])),
+            inverse: per_axis(|k| L::splat(i[k])),
+            near_side: per_axis(|k| usize::from(i[k] < 0.0)),
         }
+    }
+
+    /// Which of the rays enter one box, not after their ends.
+    #[inline(always)]
+    pub(crate) fn enters(&self, b: &Aabb, ends: L) -> u32 {
+        let (near, far) = sides(b, self.near_side);
+        let (entry, exit) = self.pass(per_axis(|k| L::splat(near[k])), per_axis(|k| L::splat(far[k])));
+        entry.le(ends.min(exit))
     }
 
     /// Where the ray enters (0 where it starts inside) and leaves boxes whose planes are given in the order in which
@@ -93,41 +113,11 @@ impl<L: Lanes> SlabRay<L> {
     #[inline(always)]
     pub(crate) fn pass(&self, near: [L; 3], far: [L; 3]) -> (L, L) {
         let [o, i] = [&self.origin, &self.inverse];
-        let near = [near[0].sub(o[0]).mul(i[0]), near[1].sub(o[1]).mul(i[1]), near[2].sub(o[2]).mul(i[2])];
-        let far = [far[0].sub(o[0]).mul(i[0]), far[1].sub(o[1]).mul(i[1]), far[2].sub(o[2]).mul(i[2])];
+        let near = per_axis(|k| near[k].sub(o[k]).mul(i[k]));
+        let far = per_axis(|k| far[k].sub(o[k]).mul(i[k]));
         let entry = near[0].max(near[1]).max(near[2].max(L::splat(0.0)));
         let exit = far[0].min(far[1]).min(far[2]).mul(L::splat(EXIT_FACTOR));
         (entry, exit)
-    }
-}
-
-impl<L: Lanes8> SlabRay<L> {
-    /// Eight rays side by side that meet the sides of boxes in the same order.
-    #[inline(always)]
-    pub(crate) fn gather(rays: &[ScalarRay; 8]) -> Self {
-        let gather = |of: fn(&SlabRay<f32>, usize) -> f32, k: usize| {
-            let mut lanes = [0.0; 8];
-            for (lane, ray) in lanes.iter_mut().zip(rays) {
-                *lane = of(&ray.slab, k);
-            }
-            L::load(&lanes)
-        };
-        let [origin, inverse]: [fn(&SlabRay<f32>, usize) -> f32; 2] =
-            [|r, k| r.origin[k], |r, k| r.inverse[k]];
-        Self {
-            origin: [gather(origin, 0), gather(origin, 1), gather(origin, 2)],
-            inverse: [gather(inverse, 0), gather(inverse, 1), gather(inverse, 2)],
-            near_side: rays[0].slab.near_side,
-        }
-    }
-
-    /// Which of the rays enter one box not after their ends.
-    #[inline(always)]
-    pub(crate) fn enters(&self, b: &Aabb, ends: L) -> u32 {
-        let (near, far) = sides(b, self.near_side);
-        let splat = |p: [f32; 3]| [L::splat(p[0]), L::splat(p[1]), L::splat(p[2])];
-        let (entry, exit) = self.pass(splat(near), splat(far));
-        entry.le(ends.min(exit))
     }
 }
 
@@ -137,72 +127,6 @@ fn sides(b: &Aabb, near_side: [usize; 3]) -> ([f32; 3], [f32; 3]) {
     let sides = [&b.min, &b.max];
     let [x, y, z] = near_side;
     ([sides[x][0], sides[y][1], sides[z][2]], [sides[1 - x][0], sides[1 - y][1], sides[1 - z][2]])
-}
-
-/// All rays of a packet: the least and greatest of their origins and inverse directions.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Interval<L> {
-    /// The origins from which the near and the far sides are nearest and farthest.
-    origin: [[L; 3]; 2],
-    inverse: [[L; 3]; 2],
-    near_side: [usize; 3],
-}
-
-impl<L: Lanes8> Interval<L> {
-    /// None where the rays are not finite or do not meet the sides of boxes in the same order.
-    #[inline(always)]
-    pub(crate) fn of(rays: &[ScalarRay]) -> Option<Self> {
-        let near_side = rays.first()?.slab.near_side;
-        let mut origin = [[f32::INFINITY; 3], [f32::NEG_INFINITY; 3]];
-        let mut inverse = origin;
-        for ray in rays {
-            let r = &ray.slab;
-            for k in 0..3 {
-                if r.near_side[k] != near_side[k]
-                    || !r.origin[k].is_finite()
-                    || r.inverse[k].is_nan()
-                    || r.inverse[k] == 0.0
-                {
-                    return None;
-                }
-                origin[0][k] = Lanes::min(r.origin[k], origin[0][k]);
-                origin[1][k] = Lanes::max(r.origin[k], origin[1][k]);
-                inverse[0][k] = Lanes::min(r.inverse[k], inverse[0][k]);
-                inverse[1][k] = Lanes::max(r.inverse[k], inverse[1][k]);
-            }
-        }
-        let splat = |p: [f32; 3]| [L::splat(p[0]), L::splat(p[1]), L::splat(p[2])];
-        let [x, y, z] = near_side;
-        let near = [origin[1 - x][0], origin[1 - y][1], origin[1 - z][2]];
-        let far = [origin[x][0], origin[y][1], origin[z][2]];
-        Some(Self { origin: [splat(near), splat(far)], inverse: inverse.map(splat), near_side })
-    }
-
-    /// Bounds of where the rays enter and leave eight boxes: no ray enters before or leaves after them.
-    #[inline(always)]
-    pub(crate) fn pass(&self, planes: &[[[f32; 8]; 3]; 2]) -> (L, L) {
-        let [[ox, oy, oz], [px, py, pz]] = self.origin;
-        let [[ix, iy, iz], [jx, jy, jz]] = self.inverse;
-        let [x, y, z] = self.near_side;
-        let near = |plane: &[f32; 8], o: L, i: L, j: L| {
-            let d = L::load(plane).sub(o);
-            d.mul(i).min(d.mul(j))
-        };
-        let far = |plane: &[f32; 8], o: L, i: L, j: L| {
-            let d = L::load(plane).sub(o);
-            d.mul(i).max(d.mul(j))
-        };
-        let entry = near(&planes[x][0], ox, ix, jx)
-            .max(near(&planes[y][1], oy, iy, jy))
-            .max(near(&planes[z][2], oz, iz, jz).max(L::splat(0.0)));
-        let exit = far(&planes[1 - x][0], px, ix, jx).min(far(&planes[1 - y][1], py, iy, jy)).min(far(
-            &planes[1 - z][2],
-            pz,
-            iz,
-            jz,
-        ));
-        (entry, exit.mul(L::splat(EXIT_FACTOR)))
-    }
 }
 
 impl SlabRay<f32> {

@@ -1,12 +1,12 @@
 //! The traced scene of the CPU: trees, each where its object stands.
 
+use super::interval::RAYS;
 use super::lanes::{Lanes8, Portable, Width};
-use super::packet::RAYS;
 use super::placement::Placement;
 use super::slab::SlabRay;
-use super::traverse::Place;
+use super::traverse::Found;
 use super::tree::Tree;
-use super::triangle::{ScalarRay, Search};
+use super::triangle::Search;
 use super::{Aggregate, Hit, HitOrder, Ray};
 use crate::math::DAffine3;
 use std::sync::Arc;
@@ -48,12 +48,8 @@ impl TracedObject {
     }
 }
 
-/// A triangle that was found.
-#[derive(Clone, Copy, Debug)]
-struct Found {
-    object: usize,
-    place: Place,
-}
+/// An object, and its triangle that was found.
+type FoundIn = (usize, Found);
 
 /// Objects that rays are traced against. Primitives count through them in their order.
 #[derive(Clone, Debug)]
@@ -88,7 +84,7 @@ impl TracedScene {
     }
 
     #[inline(always)]
-    fn search<L: Lanes8, const ANY: bool>(&self, ray: &Ray, search: &mut Search) -> Option<Found> {
+    fn search<L: Lanes8, const ANY: bool>(&self, ray: &Ray, search: &mut Search) -> Option<FoundIn> {
         let mut found = None;
         for (chunk, objects) in self.objects.chunks(SORTED).enumerate() {
             let mut sorted = [(0.0, 0); SORTED];
@@ -114,8 +110,8 @@ impl TracedScene {
                 }
                 let object = &objects[i];
                 let ray = object.own_ray(ray);
-                if let Some(place) = object.tree.search::<L, ANY>(&ray, object.first_primitive, search) {
-                    found = Some(Found { object: chunk * SORTED + i, place });
+                if let Some(triangle) = object.tree.search::<L, ANY>(&ray, object.first_primitive, search) {
+                    found = Some((chunk * SORTED + i, triangle));
                     if ANY {
                         return found;
                     }
@@ -131,7 +127,7 @@ impl TracedScene {
         &self,
         rays: &[Ray],
         searches: &mut [Search; RAYS],
-        found: &mut [Option<Found>; RAYS],
+        found: &mut [Option<FoundIn>; RAYS],
     ) {
         for (i, object) in self.objects.iter().enumerate() {
             let mut own_rays = [rays[0]; RAYS];
@@ -140,11 +136,11 @@ impl TracedScene {
             }
             let own_rays = &own_rays[..rays.len()];
             let first = object.first_primitive;
-            let note = |ray: usize, place| found[ray] = Some(Found { object: i, place });
+            let note = |ray: usize, triangle| found[ray] = Some((i, triangle));
             if !object.tree.search_packet::<L, ANY>(own_rays, first, searches, note) {
                 for (k, ray) in own_rays.iter().enumerate() {
-                    if let Some(place) = object.tree.search::<L, ANY>(ray, first, &mut searches[k]) {
-                        found[k] = Some(Found { object: i, place });
+                    if let Some(triangle) = object.tree.search::<L, ANY>(ray, first, &mut searches[k]) {
+                        found[k] = Some((i, triangle));
                         if ANY {
                             searches[k].end();
                         }
@@ -158,19 +154,7 @@ impl TracedScene {
     fn search_closest<L: Lanes8>(&self, ray: &Ray, after: Option<HitOrder>) -> Option<Hit> {
         let mut search = Search::after(after);
         let found = self.search::<L, false>(ray, &mut search)?;
-        Some(self.hit(ray, found, &search))
-    }
-
-    #[inline(always)]
-    fn hit(&self, ray: &Ray, found: Found, search: &Search) -> Hit {
-        let object = &self.objects[found.object];
-        let (triangle, corners) = object.tree.triangle_at(found.place);
-        Hit {
-            distance: search.before.distance,
-            object: found.object as u32,
-            triangle,
-            barycentric: ScalarRay::new(&object.own_ray(ray)).barycentric(&corners),
-        }
+        Some(hit(found, &search))
     }
 
     #[inline(always)]
@@ -179,8 +163,8 @@ impl TracedScene {
             let mut searches = [Search::after(None); RAYS];
             let mut found = [None; RAYS];
             self.search_packet::<L, false>(rays, &mut searches, &mut found);
-            for (((hit, ray), found), search) in hits.iter_mut().zip(rays).zip(found).zip(&searches) {
-                *hit = found.map(|f| self.hit(ray, f, search));
+            for ((to, found), search) in hits.iter_mut().zip(found).zip(&searches) {
+                *to = found.map(|f| hit(f, search));
             }
         }
     }
@@ -206,6 +190,12 @@ impl TracedScene {
     fn search_any<L: Lanes8>(&self, ray: &Ray, end: f32) -> bool {
         self.search::<L, true>(ray, &mut Search::until(end)).is_some()
     }
+}
+
+#[inline(always)]
+fn hit((object, found): FoundIn, search: &Search) -> Hit {
+    let Found { triangle, barycentric } = found;
+    Hit { distance: search.before.distance, object: object as u32, triangle, barycentric }
 }
 
 #[cfg(target_arch = "x86_64")]

@@ -6,37 +6,33 @@ use super::lanes::Lanes8;
 use super::slab::SlabRay;
 use super::stack::{Stack, Waiting};
 use super::tree::{Block, LEAF, Node, Tree};
-use super::triangle::{ScalarRay, Search, ShearRay};
+use super::triangle::{Search, ShearRay, distance_in_plane};
 
-/// Where in a tree a triangle stands.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct Place {
-    pub(crate) block: u32,
-    pub(crate) lane: u32,
+/// A triangle of a tree that was found.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Found {
+    /// Its number.
+    pub(crate) triangle: u32,
+    /// Weights of its second and third corner; 0 where any triangle would do.
+    pub(crate) barycentric: [f32; 2],
 }
 
 impl Tree {
-    /// A triangle's number and corners.
-    pub(crate) fn triangle_at(&self, place: Place) -> (u32, [[f32; 3]; 3]) {
-        let block = &self.blocks[place.block as usize];
-        (block.triangles[place.lane as usize], block.corners_of(place.lane as usize))
-    }
-
     /// Looks for a candidate; `first` is the primitive number of the tree's triangle 0. With ANY the first one found
-    /// ends the search, else `search` ends before the first in the order, whose place is returned.
+    /// ends the search, else `search` ends before the first in the order, which is returned.
     #[inline(always)]
     pub(crate) fn search<L: Lanes8, const ANY: bool>(
         &self,
         ray: &Ray,
         first: u32,
         search: &mut Search,
-    ) -> Option<Place> {
+    ) -> Option<Found> {
         let slab = SlabRay::<L>::new(ray);
         let mut stack = Stack::new();
         let mut next = nearest_child(self.nodes.first()?, &slab, search.before.distance, &mut stack);
         // most rays of many a picture end here
         next?;
-        let scalar = ScalarRay::new(ray);
+        let scalar_slab = SlabRay::new(ray);
         let shear = ShearRay::<L>::new(ray);
         let mut found = None;
         loop {
@@ -51,11 +47,9 @@ impl Tree {
                 next = nearest_child(&self.nodes[child as usize], &slab, search.before.distance, &mut stack);
                 continue;
             }
-            let block = child & !LEAF;
-            if let Some(lane) =
-                search_block::<L, ANY>(&self.blocks[block as usize], &shear, &scalar, first, search)
-            {
-                found = Some(Place { block, lane });
+            let block = &self.blocks[(child & !LEAF) as usize];
+            if let Some(nearer) = search_block::<L, ANY>(block, &shear, || scalar_slab, first, search) {
+                found = Some(nearer);
                 if ANY {
                     return found;
                 }
@@ -97,15 +91,15 @@ fn nearest_child<L: Lanes8>(node: &Node, slab: &SlabRay<L>, distance: f32, stack
     Some(nearest.child())
 }
 
-/// Tests the triangles of a leaf; gives the lane of the last one that was found.
+/// Tests the triangles of a leaf; gives the first in the order of those that are admitted.
 #[inline(always)]
 pub(crate) fn search_block<L: Lanes8, const ANY: bool>(
     block: &Block,
     shear: &ShearRay<L>,
-    scalar: &ScalarRay,
+    slab: impl Fn() -> SlabRay<f32>,
     first: u32,
     search: &mut Search,
-) -> Option<u32> {
+) -> Option<Found> {
     let [kx, ky, kz] = shear.axes;
     let corner = |c: &[[f32; 8]; 3]| [L::load(&c[kx]), L::load(&c[ky]), L::load(&c[kz])];
     let edges = shear.edges(corner(&block.corners[0]), corner(&block.corners[1]), corner(&block.corners[2]));
@@ -123,15 +117,17 @@ pub(crate) fn search_block<L: Lanes8, const ANY: bool>(
     while inside != 0 {
         let lane = inside.trailing_zeros() as usize & 7;
         inside &= inside - 1;
-        let Some(distance) = scalar.distance_in_plane(&block.corners_of(lane), t[lane]) else { continue };
+        let Some(distance) = distance_in_plane(&slab(), &block.corners_of(lane), t[lane]) else { continue };
         let candidate = HitOrder { distance, primitive: first.wrapping_add(block.triangles[lane]) };
         if search.admits(candidate) {
-            found = Some(lane as u32);
             if ANY {
-                break;
+                return Some(Found { triangle: block.triangles[lane], barycentric: [0.0; 2] });
             }
             search.before = candidate;
+            found = Some(lane);
         }
     }
-    found
+    let lane = found?;
+    let [v, w] = edges.barycentric();
+    Some(Found { triangle: block.triangles[lane], barycentric: [v.store()[lane], w.store()[lane]] })
 }

@@ -3,6 +3,7 @@
 
 use super::binary::{Binary, Quality};
 use super::collapse::Shape;
+use super::lanes::per_axis;
 use super::slab::Aabb;
 use std::ops::Range;
 
@@ -42,7 +43,7 @@ impl Block {
     /// The corners of one triangle.
     #[inline(always)]
     pub(crate) fn corners_of(&self, lane: usize) -> [[f32; 3]; 3] {
-        self.corners.map(|corner| corner.map(|axis| axis[lane]))
+        per_axis(|corner| per_axis(|axis| self.corners[corner][axis][lane]))
     }
 }
 

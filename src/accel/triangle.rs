@@ -5,7 +5,7 @@
 //! products of an edge's value are rounded monotonically, so its sign is right or the value is 0, and 0 counts for
 //! both neighbours, whose values are negatives of each other bit for bit (nothing is fused).
 
-use super::lanes::Lanes;
+use super::lanes::{Lanes, per_axis};
 use super::slab::{Aabb, SlabRay};
 use super::{HitOrder, Ray};
 
@@ -30,7 +30,7 @@ impl<L: Lanes> ShearRay<L> {
     #[inline(always)]
     pub(crate) fn new(ray: &Ray) -> Self {
         let d = ray.direction.to_array();
-        let size = d.map(f32::abs);
+        let size = per_axis(|k| d[k].abs());
         let kz =
             if size[0] >= size[1] && size[0] >= size[2] { 0 } else { 1 + usize::from(size[1] < size[2]) };
         let axes = [(kz + 1) % 3, (kz + 2) % 3, kz];
@@ -38,7 +38,7 @@ impl<L: Lanes> ShearRay<L> {
         let z = d[kz];
         Self {
             axes,
-            origin: [L::splat(o[axes[0]]), L::splat(o[axes[1]]), L::splat(o[axes[2]])],
+            origin: per_axis(|k| L::splat(o[axes[k]])),
             shear: [L::splat(d[axes[0]] / z), L::splat(d[axes[1]] / z), L::splat(1.0 / z)],
         }
     }
@@ -78,8 +78,11 @@ impl ShearRay<f32> {
     /// The same ray in all lanes.
     #[inline(always)]
     pub(crate) fn splat<L: Lanes>(&self) -> ShearRay<L> {
-        let splat = |v: [f32; 3]| [L::splat(v[0]), L::splat(v[1]), L::splat(v[2])];
-        ShearRay { axes: self.axes, origin: splat(self.origin), shear: splat(self.shear) }
+        ShearRay {
+            axes: self.axes,
+            origin: per_axis(|k| L::splat(self.origin[k])),
+            shear: per_axis(|k| L::splat(self.shear[k])),
+        }
     }
 }
 
@@ -90,6 +93,13 @@ impl<L: Lanes> Edges<L> {
         let [u, v, w] = self.values;
         let zero = L::splat(0.0);
         zero.le(u.min(v.min(w))) | u.max(v.max(w)).le(zero)
+    }
+
+    /// Weights of the second and third corner.
+    #[inline(always)]
+    pub(crate) fn barycentric(&self) -> [L; 2] {
+        let det = self.determinant();
+        [self.values[1].div(det), self.values[2].div(det)]
     }
 
     #[inline(always)]
@@ -103,8 +113,8 @@ impl<L: Lanes> Edges<L> {
 /// not finite.
 pub fn has_area(corners: &[[f32; 3]; 3]) -> bool {
     let [a, b, c] = corners.map(|p| p.map(f64::from));
-    let e: [f64; 3] = std::array::from_fn(|k| b[k] - a[k]);
-    let f: [f64; 3] = std::array::from_fn(|k| c[k] - a[k]);
+    let e = per_axis(|k| b[k] - a[k]);
+    let f = per_axis(|k| c[k] - a[k]);
     let n = [e[1] * f[2] - e[2] * f[1], e[2] * f[0] - e[0] * f[2], e[0] * f[1] - e[1] * f[0]];
     n.iter().all(|x| x.is_finite()) && n != [0.0; 3]
 }
@@ -151,45 +161,33 @@ fn precedes(a: HitOrder, b: HitOrder) -> bool {
     a.distance < b.distance || (a.distance == b.distance && a.primitive < b.primitive)
 }
 
-/// A ray against one triangle at a time: the reference, and what ends every traversal.
+/// A ray against one triangle at a time: the reference.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct ScalarRay {
-    pub(crate) slab: SlabRay<f32>,
-    pub(crate) shear: ShearRay<f32>,
+    slab: SlabRay<f32>,
+    shear: ShearRay<f32>,
 }
 
 impl ScalarRay {
-    #[inline(always)]
     pub(crate) fn new(ray: &Ray) -> Self {
         Self { slab: SlabRay::new(ray), shear: ShearRay::new(ray) }
     }
 
-    #[inline(always)]
-    fn edges(&self, corners: &[[f32; 3]; 3]) -> Edges<f32> {
+    /// The canonical distance of a triangle that has area, and the weights of its second and third corner; None where
+    /// it is not hit.
+    pub(crate) fn hit(&self, corners: &[[f32; 3]; 3]) -> Option<(f32, [f32; 2])> {
         let [a, b, c] = corners.map(|p| self.shear.axes.map(|k| p[k]));
-        self.shear.edges(a, b, c)
-    }
-
-    /// The canonical distance of a triangle that has area; None where it is not hit.
-    pub(crate) fn distance(&self, corners: &[[f32; 3]; 3]) -> Option<f32> {
-        let edges = self.edges(corners);
+        let edges = self.shear.edges(a, b, c);
         if edges.inside() == 0 {
             return None;
         }
         let t = self.shear.plane(&edges);
-        if t > 0.0 { self.distance_in_plane(corners, t) } else { None }
+        if t > 0.0 { Some((distance_in_plane(&self.slab, corners, t)?, edges.barycentric())) } else { None }
     }
+}
 
-    /// The canonical distance of a triangle whose plane is hit inside it at t.
-    #[inline(always)]
-    pub(crate) fn distance_in_plane(&self, corners: &[[f32; 3]; 3], t: f32) -> Option<f32> {
-        self.slab.entry(&Aabb::own(corners)).map(|entry| Lanes::max(t, entry))
-    }
-
-    /// Weights of the second and third corner of a triangle that is hit.
-    pub(crate) fn barycentric(&self, corners: &[[f32; 3]; 3]) -> [f32; 2] {
-        let edges = self.edges(corners);
-        let det = edges.determinant();
-        [edges.values[1] / det, edges.values[2] / det]
-    }
+/// The canonical distance of a triangle whose plane is hit inside it at t.
+#[inline(always)]
+pub(crate) fn distance_in_plane(slab: &SlabRay<f32>, corners: &[[f32; 3]; 3], t: f32) -> Option<f32> {
+    slab.entry(&Aabb::own(corners)).map(|entry| Lanes::max(t, entry))
 }
