@@ -1,6 +1,7 @@
 //! Fits a tree to positions: corners into blocks, own boxes into leaves, leaves into nodes, level by level upwards.
 
 use super::collapse::Shape;
+use super::lanes::per_axis;
 use super::slab::Aabb;
 use super::tree::{Block, LEAF, NO_CHILD, NO_TRIANGLE, Node, Tree, WIDTH};
 use super::triangle::has_area;
@@ -49,9 +50,10 @@ impl Tree {
 
 impl Node {
     /// One child's box.
+    #[inline(always)]
     pub(crate) fn child_box(&self, lane: usize) -> Aabb {
-        let [min, max] = [0, 1].map(|side| [0, 1, 2].map(|axis| self.planes[side][axis][lane]));
-        Aabb { min, max }
+        let [min, max] = &self.planes;
+        Aabb { min: per_axis(|k| min[k][lane]), max: per_axis(|k| max[k][lane]) }
     }
 
     /// The box of all children.

@@ -1,7 +1,7 @@
 //! Coherent rays side by side, and the interval of them all.
 
 use super::Ray;
-use super::lanes::{Lanes, Lanes8};
+use super::lanes::{Lanes, Lanes8, per_axis};
 use super::slab::{EXIT_FACTOR, SlabRay, inverse};
 use super::tree::WIDTH;
 
@@ -24,8 +24,8 @@ impl<L: Lanes8> PacketSlabs<L> {
     #[inline(always)]
     pub(crate) fn new(rays: &[Ray]) -> Option<Self> {
         let (first, len) = (rays.first()?, rays.len().min(RAYS));
-        let mut origin = first.origin.to_array().map(|x| [x; RAYS]);
-        let mut direction = first.direction.to_array().map(|x| [x; RAYS]);
+        let mut origin = per_axis(|k| [first.origin[k]; RAYS]);
+        let mut direction = per_axis(|k| [first.direction[k]; RAYS]);
         for (i, ray) in rays[..len].iter().enumerate().skip(1) {
             for k in 0..3 {
                 origin[k][i] = ray.origin[k];
@@ -51,15 +51,14 @@ impl<L: Lanes8> PacketSlabs<L> {
             return None;
         }
         let group = |g: usize| {
-            let load =
-                |from: &[[f32; RAYS]; 3]| [0, 1, 2].map(|k| L::load(&from[k].as_chunks::<WIDTH>().0[g]));
+            let load = |from: &[[f32; RAYS]; 3]| per_axis(|k| L::load(&from[k].as_chunks::<WIDTH>().0[g]));
             SlabRay { origin: load(&origin), inverse: load(&inverses), near_side }
         };
         let [x, y, z] = near_side;
         let origins = [least_origin, greatest_origin];
         let near = [origins[1 - x][0], origins[1 - y][1], origins[1 - z][2]];
         let far = [origins[x][0], origins[y][1], origins[z][2]];
-        let splat = |p: [f32; 3]| [L::splat(p[0]), L::splat(p[1]), L::splat(p[2])];
+        let splat = |p: [f32; 3]| per_axis(|k| L::splat(p[k]));
         let interval = Interval {
             near_origin: splat(near),
             far_origin: splat(far),
@@ -74,8 +73,8 @@ impl<L: Lanes8> PacketSlabs<L> {
     #[inline(always)]
     pub(crate) fn ray(&self, i: usize) -> SlabRay<f32> {
         SlabRay {
-            origin: [0, 1, 2].map(|k| self.origin[k][i]),
-            inverse: [0, 1, 2].map(|k| self.inverse[k][i]),
+            origin: per_axis(|k| self.origin[k][i]),
+            inverse: per_axis(|k| self.inverse[k][i]),
             near_side: self.interval.near_side,
         }
     }
@@ -84,17 +83,22 @@ impl<L: Lanes8> PacketSlabs<L> {
 /// The least and the greatest on each axis.
 #[inline(always)]
 fn extremes<L: Lanes8>(values: &[[f32; RAYS]; 3]) -> [[f32; 3]; 2] {
-    [[0, 1, 2].map(|k| -greatest::<L>(&values[k].map(|x| -x))), [0, 1, 2].map(|k| greatest::<L>(&values[k]))]
+    [per_axis(|k| fold(&values[k], L::min, Lanes::min)), per_axis(|k| fold(&values[k], L::max, Lanes::max))]
 }
 
 /// The greatest float of a packet's.
 #[inline(always)]
 pub(crate) fn greatest<L: Lanes8>(values: &[f32; RAYS]) -> f32 {
+    fold(values, L::max, Lanes::max)
+}
+
+#[inline(always)]
+fn fold<L: Lanes8>(values: &[f32; RAYS], wide: impl Fn(L, L) -> L, narrow: impl Fn(f32, f32) -> f32) -> f32 {
     let groups = values.as_chunks::<WIDTH>().0;
-    let mut lanes = L::load(&groups[0]).max(L::load(&groups[1])).store();
+    let mut lanes = wide(L::load(&groups[0]), L::load(&groups[1])).store();
     for half in [4, 2, 1] {
         for i in 0..half {
-            lanes[i] = Lanes::max(lanes[i], lanes[i + half]);
+            lanes[i] = narrow(lanes[i], lanes[i + half]);
         }
     }
     lanes[0]

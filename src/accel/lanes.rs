@@ -1,6 +1,12 @@
 //! Floats side by side: the arithmetic that every path shares. All impls do the same IEEE operations, so that a formula
 //! written once over [`Lanes`] gives the same bits for one float, for eight portable ones, and for AVX2.
 
+/// One value an axis. As an array's own `map` would, but inlined for certain.
+#[inline(always)]
+pub(crate) fn per_axis<T>(mut of: impl FnMut(usize) -> T) -> [T; 3] {
+    [of(0), of(1), of(2)]
+}
+
 /// One or more floats that are computed together. Nothing is fused; `min` and `max` give the second operand where the
 /// first is not less (not greater), as x86 does, so NaN and the sign of zero agree too.
 pub(crate) trait Lanes: Copy {

@@ -2,7 +2,7 @@
 //! another is never entered later nor missed (every step is monotonic in the planes).
 
 use super::Ray;
-use super::lanes::Lanes;
+use super::lanes::{Lanes, per_axis};
 
 /// Factor on the exit of a box. Let u = 2⁻²⁴. The slab test's own roundings need 1 + 6u (Ize, "Robust BVH Ray
 /// Traversal", 2013: 1 + 2γ₃); the edge test sees a vertex displaced by up to 4u of its distance from the origin,
@@ -35,8 +35,8 @@ impl Aabb {
     #[must_use]
     pub fn union(&self, other: &Self) -> Self {
         Self {
-            min: std::array::from_fn(|k| Lanes::min(self.min[k], other.min[k])),
-            max: std::array::from_fn(|k| Lanes::max(self.max[k], other.max[k])),
+            min: per_axis(|k| Lanes::min(self.min[k], other.min[k])),
+            max: per_axis(|k| Lanes::max(self.max[k], other.max[k])),
         }
     }
 
@@ -55,11 +55,11 @@ impl Aabb {
     #[inline(always)]
     pub fn own(corners: &[[f32; 3]; 3]) -> Self {
         let [a, b, c] = corners;
-        let min: [f32; 3] = std::array::from_fn(|k| Lanes::min(a[k], Lanes::min(b[k], c[k])));
-        let max: [f32; 3] = std::array::from_fn(|k| Lanes::max(a[k], Lanes::max(b[k], c[k])));
+        let min = per_axis(|k| Lanes::min(a[k], Lanes::min(b[k], c[k])));
+        let max = per_axis(|k| Lanes::max(a[k], Lanes::max(b[k], c[k])));
         let extent = Lanes::max(max[0] - min[0], Lanes::max(max[1] - min[1], max[2] - min[2]));
         let margin = extent * (8.0 * f32::EPSILON);
-        Self { min: min.map(|x| -next_up(margin - x)), max: max.map(|x| next_up(x + margin)) }
+        Self { min: per_axis(|k| -next_up(margin - min[k])), max: per_axis(|k| next_up(max[k] + margin)) }
     }
 }
 
@@ -91,11 +91,12 @@ impl<L: Lanes> SlabRay<L> {
     #[inline(always)]
     pub(crate) fn new(ray: &Ray) -> Self {
         let o = ray.origin.to_array();
-        let i = ray.direction.to_array().map(inverse);
+        let d = ray.direction.to_array();
+        let i = per_axis(|k| inverse(d[k]));
         Self {
-            origin: [L::splat(o[0]), L::splat(o[1]), L::splat(o[2])],
-            inverse: [L::splat(i[0]), L::splat(i[1]), L::splat(i[2])],
-            near_side: i.map(|x| usize::from(x < 0.0)),
+            origin: per_axis(|k| L::splat(o[k])),
+            inverse: per_axis(|k| L::splat(i[k])),
+            near_side: per_axis(|k| usize::from(i[k] < 0.0)),
         }
     }
 
@@ -103,8 +104,7 @@ impl<L: Lanes> SlabRay<L> {
     #[inline(always)]
     pub(crate) fn enters(&self, b: &Aabb, ends: L) -> u32 {
         let (near, far) = sides(b, self.near_side);
-        let splat = |p: [f32; 3]| [L::splat(p[0]), L::splat(p[1]), L::splat(p[2])];
-        let (entry, exit) = self.pass(splat(near), splat(far));
+        let (entry, exit) = self.pass(per_axis(|k| L::splat(near[k])), per_axis(|k| L::splat(far[k])));
         entry.le(ends.min(exit))
     }
 
@@ -113,8 +113,8 @@ impl<L: Lanes> SlabRay<L> {
     #[inline(always)]
     pub(crate) fn pass(&self, near: [L; 3], far: [L; 3]) -> (L, L) {
         let [o, i] = [&self.origin, &self.inverse];
-        let near = [near[0].sub(o[0]).mul(i[0]), near[1].sub(o[1]).mul(i[1]), near[2].sub(o[2]).mul(i[2])];
-        let far = [far[0].sub(o[0]).mul(i[0]), far[1].sub(o[1]).mul(i[1]), far[2].sub(o[2]).mul(i[2])];
+        let near = per_axis(|k| near[k].sub(o[k]).mul(i[k]));
+        let far = per_axis(|k| far[k].sub(o[k]).mul(i[k]));
         let entry = near[0].max(near[1]).max(near[2].max(L::splat(0.0)));
         let exit = far[0].min(far[1]).min(far[2]).mul(L::splat(EXIT_FACTOR));
         (entry, exit)

@@ -127,8 +127,7 @@ pub(crate) fn search_block<L: Lanes8, const ANY: bool>(
             found = Some(lane);
         }
     }
-    found.map(|lane| Found {
-        triangle: block.triangles[lane],
-        barycentric: edges.barycentric().map(|weight| weight.store()[lane]),
-    })
+    let lane = found?;
+    let [v, w] = edges.barycentric();
+    Some(Found { triangle: block.triangles[lane], barycentric: [v.store()[lane], w.store()[lane]] })
 }

@@ -3,6 +3,7 @@
 
 use super::binary::{Binary, Quality};
 use super::collapse::Shape;
+use super::lanes::per_axis;
 use super::slab::Aabb;
 use std::ops::Range;
 
@@ -42,8 +43,7 @@ impl Block {
     /// The corners of one triangle.
     #[inline(always)]
     pub(crate) fn corners_of(&self, lane: usize) -> [[f32; 3]; 3] {
-        // by place, as mapping the arrays themselves would copy them whole
-        [0, 1, 2].map(|corner| [0, 1, 2].map(|axis| self.corners[corner][axis][lane]))
+        per_axis(|corner| per_axis(|axis| self.corners[corner][axis][lane]))
     }
 }
 

@@ -5,7 +5,7 @@
 //! products of an edge's value are rounded monotonically, so its sign is right or the value is 0, and 0 counts for
 //! both neighbours, whose values are negatives of each other bit for bit (nothing is fused).
 
-use super::lanes::Lanes;
+use super::lanes::{Lanes, per_axis};
 use super::slab::{Aabb, SlabRay};
 use super::{HitOrder, Ray};
 
@@ -30,7 +30,7 @@ impl<L: Lanes> ShearRay<L> {
     #[inline(always)]
     pub(crate) fn new(ray: &Ray) -> Self {
         let d = ray.direction.to_array();
-        let size = d.map(f32::abs);
+        let size = per_axis(|k| d[k].abs());
         let kz =
             if size[0] >= size[1] && size[0] >= size[2] { 0 } else { 1 + usize::from(size[1] < size[2]) };
         let axes = [(kz + 1) % 3, (kz + 2) % 3, kz];
@@ -38,7 +38,7 @@ impl<L: Lanes> ShearRay<L> {
         let z = d[kz];
         Self {
             axes,
-            origin: [L::splat(o[axes[0]]), L::splat(o[axes[1]]), L::splat(o[axes[2]])],
+            origin: per_axis(|k| L::splat(o[axes[k]])),
             shear: [L::splat(d[axes[0]] / z), L::splat(d[axes[1]] / z), L::splat(1.0 / z)],
         }
     }
@@ -78,8 +78,11 @@ impl ShearRay<f32> {
     /// The same ray in all lanes.
     #[inline(always)]
     pub(crate) fn splat<L: Lanes>(&self) -> ShearRay<L> {
-        let splat = |v: [f32; 3]| [L::splat(v[0]), L::splat(v[1]), L::splat(v[2])];
-        ShearRay { axes: self.axes, origin: splat(self.origin), shear: splat(self.shear) }
+        ShearRay {
+            axes: self.axes,
+            origin: per_axis(|k| L::splat(self.origin[k])),
+            shear: per_axis(|k| L::splat(self.shear[k])),
+        }
     }
 }
 
@@ -110,8 +113,8 @@ impl<L: Lanes> Edges<L> {
 /// not finite.
 pub fn has_area(corners: &[[f32; 3]; 3]) -> bool {
     let [a, b, c] = corners.map(|p| p.map(f64::from));
-    let e: [f64; 3] = std::array::from_fn(|k| b[k] - a[k]);
-    let f: [f64; 3] = std::array::from_fn(|k| c[k] - a[k]);
+    let e = per_axis(|k| b[k] - a[k]);
+    let f = per_axis(|k| c[k] - a[k]);
     let n = [e[1] * f[2] - e[2] * f[1], e[2] * f[0] - e[0] * f[2], e[0] * f[1] - e[1] * f[0]];
     n.iter().all(|x| x.is_finite()) && n != [0.0; 3]
 }

@@ -167,7 +167,7 @@ fn picture(device: &mut dyn Device, frame: &Frame) -> Film {
 }
 
 /// A picture of odd size with several samples, all auxiliary pictures, and lights of each kind.
-fn shot() -> Shot {
+pub(super) fn shot() -> Shot {
     let mut aovs = AovSet::default();
     for aov in Aov::ALL {
         aovs.insert(aov);

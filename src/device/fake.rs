@@ -132,3 +132,45 @@ impl Device for FakeDevice {
         Ok(Traced { film, rays: RayCounts::default(), trace_ms: 0.0, readback_ms: None })
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::plan::plan_frame;
+
+    fn apply(device: &mut FakeDevice, frame: &Frame) -> Result<UpdateCost, DeviceError> {
+        let plan = plan_frame(frame, device.residency(), false);
+        device.apply(&plan, frame)
+    }
+
+    #[test]
+    fn it_fails_as_it_is_told() {
+        let frame = Frame::default();
+        let with = |fault| FakeDevice::new("fake", 100).with_fault(frame.hash(), fault);
+        assert!(matches!(
+            apply(&mut with(Fault::OutOfMemory), &frame),
+            Err(DeviceError::OutOfMemory { budget_bytes: 100, .. })
+        ));
+
+        let shot = crate::device::conformance::shot();
+        let mut lost = with(Fault::Lost);
+        apply(&mut lost, &frame).unwrap();
+        assert!(matches!(lost.trace(&frame, &shot, &Stop::default()), Err(DeviceError::Lost { .. })));
+        assert!(matches!(apply(&mut lost, &frame), Err(DeviceError::Lost { .. })), "it stays lost");
+
+        let mut panics = with(Fault::Panic);
+        apply(&mut panics, &frame).unwrap();
+        let trace = std::panic::AssertUnwindSafe(|| panics.trace(&frame, &shot, &Stop::default()).is_ok());
+        assert!(std::panic::catch_unwind(trace).is_err());
+    }
+
+    #[test]
+    fn other_frames_are_drawn_in_their_colour() {
+        let frame = Frame::default();
+        let mut device = FakeDevice::new("fake", 100).with_fault(PartHash(1), Fault::Panic);
+        apply(&mut device, &frame).unwrap();
+        let shot = crate::device::conformance::shot();
+        let film = device.trace(&frame, &shot, &Stop::default()).unwrap().film;
+        assert!(film.rgb.iter().all(|p| *p == color_of(&frame, &shot)));
+    }
+}
