@@ -85,25 +85,13 @@ impl TracedScene {
 
     #[inline(always)]
     fn search<L: Lanes8, const ANY: bool>(&self, ray: &Ray, search: &mut Search) -> Option<FoundIn> {
+        if let [TracedObject { tree, placement: None, .. }] = &self.objects[..] {
+            return tree.search::<L, ANY>(ray, 0, search).map(|triangle| (0, triangle));
+        }
+        let slab = SlabRay::new(ray);
         let mut found = None;
         for (chunk, objects) in self.objects.chunks(SORTED).enumerate() {
-            let mut sorted = [(0.0, 0); SORTED];
-            let mut count = 0;
-            if let [TracedObject { placement: None, .. }] = objects {
-                count = 1;
-            } else {
-                let slab = SlabRay::new(ray);
-                for (i, object) in objects.iter().enumerate() {
-                    let Some(entry) = object.entry(ray, &slab) else { continue };
-                    let mut place = count;
-                    while place > 0 && sorted[place - 1].0 > entry {
-                        sorted[place] = sorted[place - 1];
-                        place -= 1;
-                    }
-                    sorted[place] = (entry, i);
-                    count += 1;
-                }
-            }
+            let (sorted, count) = by_entry(objects, ray, &slab);
             for &(entry, i) in &sorted[..count] {
                 if entry > search.before.distance {
                     break;
@@ -190,6 +178,24 @@ impl TracedScene {
     fn search_any<L: Lanes8>(&self, ray: &Ray, end: f32) -> bool {
         self.search::<L, true>(ray, &mut Search::until(end)).is_some()
     }
+}
+
+/// The objects that a ray enters, with their entries, the nearest first, and how many they are.
+#[inline(always)]
+fn by_entry(objects: &[TracedObject], ray: &Ray, slab: &SlabRay<f32>) -> ([(f32, usize); SORTED], usize) {
+    let mut sorted = [(0.0, 0); SORTED];
+    let mut count = 0;
+    for (i, object) in objects.iter().enumerate() {
+        let Some(entry) = object.entry(ray, slab) else { continue };
+        let mut place = count;
+        while place > 0 && sorted[place - 1].0 > entry {
+            sorted[place] = sorted[place - 1];
+            place -= 1;
+        }
+        sorted[place] = (entry, i);
+        count += 1;
+    }
+    (sorted, count)
 }
 
 #[inline(always)]
