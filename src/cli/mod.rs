@@ -23,7 +23,7 @@ const EXIT_NO_DEVICE: u8 = 3;
 
 /// Renders animation sequences (folders of OBJ frames) to pictures by ray tracing, headless.
 #[derive(Parser, Debug)]
-#[command(name = "rentix", version, propagate_version = true, max_term_width = 100)]
+#[command(name = "rentix", version, propagate_version = true, args_override_self = true, max_term_width = 100)]
 #[command(after_help = "Example: rentix render walk/ -o out/walk --size fullhd\n\nExit status: 0 all is there, 1 some frames failed, 2 nothing was tried, 3 no device could do it, 130/143 stopped.")]
 pub struct Cli {
     #[command(flatten)]

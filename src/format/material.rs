@@ -11,20 +11,27 @@ use crate::warning::Warnings;
 use std::collections::{HashMap, HashSet};
 use std::path::{Path, PathBuf};
 
+/// An OBJ may name so many libraries; each costs a look at the disk.
+const MAX_LIBRARIES: usize = 1024;
+
 /// Materials by name.
 #[derive(Clone, Debug, Default)]
-pub struct Library(HashMap<Vec<u8>, Part<Material>>);
+pub struct Library {
+    materials: HashMap<Vec<u8>, Part<Material>>,
+    /// Whether a file that may define more was not found, which was told already.
+    pub(super) incomplete: bool,
+}
 
 impl Library {
     /// The material of that name.
     pub fn get(&self, name: &[u8]) -> Option<&Part<Material>> {
-        self.0.get(name)
+        self.materials.get(name)
     }
 }
 
 impl FromIterator<(Vec<u8>, Part<Material>)> for Library {
     fn from_iter<I: IntoIterator<Item = (Vec<u8>, Part<Material>)>>(materials: I) -> Self {
-        Self(materials.into_iter().collect())
+        Self { materials: materials.into_iter().collect(), incomplete: false }
     }
 }
 
@@ -43,6 +50,7 @@ pub(super) struct Loader<'a> {
     entries: HashMap<Vec<u8>, Entry>,
     lookup: Lookup,
     contents: HashMap<PathBuf, Option<PartHash>>,
+    incomplete: bool,
     /// Every file that was read, in order.
     pub inputs: Vec<PathBuf>,
     /// Their bytes.
@@ -59,6 +67,7 @@ impl<'a> Loader<'a> {
             entries: HashMap::new(),
             lookup: Lookup::default(),
             contents: HashMap::new(),
+            incomplete: false,
             inputs: Vec::new(),
             bytes_read: 0,
             missing: Vec::new(),
@@ -72,10 +81,7 @@ impl<'a> Loader<'a> {
         names: impl Iterator<Item = &'n [u8]>,
         warnings: &mut Warnings,
     ) -> Result<Library, FormatError> {
-        let mut seen = HashSet::new();
-        for statement in libraries.iter().filter(|statement| seen.insert(**statement)) {
-            self.read_libraries(statement, warnings);
-        }
+        self.read_libraries(libraries, warnings);
         if let Some(file) = &self.options.materials_file {
             let materials = self.read_library(file, warnings)?;
             self.entries.extend(materials);
@@ -91,42 +97,52 @@ impl<'a> Loader<'a> {
                 materials.insert(name.to_vec(), Part::new(self.material(entry, warnings)));
             }
         }
-        Ok(Library(materials))
+        Ok(Library { materials, incomplete: self.incomplete })
     }
 
-    /// Reads the files that one `mtllib` names: all of it is one name with blanks, or else several. Of materials
-    /// with one name in several files that of the first stands, as the format says.
-    fn read_libraries(&mut self, statement: &[u8], warnings: &mut Warnings) {
-        let folder = folder(self.obj);
-        let whole = self
-            .lookup
-            .find(statement, &[folder])
-            .or_else(|| self.lookup.find(&unescaped(statement), &[folder]));
-        let found: Vec<_> = if whole.is_some() {
-            vec![(statement.to_vec(), whole)]
-        } else {
-            let names = split_escaped(statement);
-            names.into_iter().map(|name| (name.clone(), self.lookup.find(&name, &[folder]))).collect()
-        };
-        for (name, path) in found {
-            let Some(path) = path else {
-                let text = format!(
-                    "material library `{}` is not found; its materials are the default",
-                    shown(&name)
-                );
-                self.missing.push(format!("{}: {text}", self.obj.display()));
-                warnings.add(Some(self.obj), None, text);
-                continue;
-            };
-            match self.read_library(&path, warnings) {
-                Ok(materials) => {
-                    for (name, entry) in materials {
-                        self.entries.entry(name).or_insert(entry);
-                    }
+    /// Reads the files behind `mtllib`. Of materials with one name in several files that of the first stands, as the
+    /// format says.
+    fn read_libraries(&mut self, statements: &[&[u8]], warnings: &mut Warnings) {
+        let mut seen = HashSet::new();
+        let mut named = 0;
+        for statement in statements.iter().filter(|statement| seen.insert(**statement)) {
+            for name in self.library_names(statement) {
+                named += 1;
+                if named > MAX_LIBRARIES {
+                    let text = format!(
+                        "more than {MAX_LIBRARIES} material libraries are named; the others are left out"
+                    );
+                    return warnings.add(Some(self.obj), None, text);
                 }
-                Err(error) => warnings.add(Some(self.obj), None, format!("material library {error}")),
+                if let Err(text) = self.read_named(&name, warnings) {
+                    self.missing.push(format!("{}: {text}", self.obj.display()));
+                    warnings.add(Some(self.obj), None, text);
+                    self.incomplete = true;
+                }
             }
         }
+    }
+
+    /// What stands behind one `mtllib` is one name with blanks if there is such a file, else several.
+    fn library_names(&mut self, statement: &[u8]) -> Vec<Vec<u8>> {
+        let whole = [statement.to_vec(), unescaped(statement)];
+        let mut found =
+            whole.into_iter().filter(|name| self.lookup.find(name, &[folder(self.obj)]).is_some());
+        found.next().map_or_else(|| split_escaped(statement), |name| vec![name])
+    }
+
+    /// Reads one library; else what to say.
+    fn read_named(&mut self, name: &[u8], warnings: &mut Warnings) -> Result<(), String> {
+        let Some(path) = self.lookup.find(name, &[folder(self.obj)]) else {
+            let name = shown(name);
+            return Err(format!("material library `{name}` is not found; its materials are the default"));
+        };
+        let materials =
+            self.read_library(&path, warnings).map_err(|error| format!("material library {error}"))?;
+        for (name, entry) in materials {
+            self.entries.entry(name).or_insert(entry);
+        }
+        Ok(())
     }
 
     fn read_library(
@@ -155,9 +171,7 @@ impl<'a> Loader<'a> {
     /// The files behind `mtllib` statements and the options' file, and the maps of all their materials.
     pub(super) fn named_files(mut self, libraries: &[&[u8]]) -> Vec<PathBuf> {
         let mut unheard = Warnings::default();
-        for statement in libraries {
-            self.read_libraries(statement, &mut unheard);
-        }
+        self.read_libraries(libraries, &mut unheard);
         if let Some(file) = &self.options.materials_file {
             let materials = self.read_library(file, &mut unheard).unwrap_or_default();
             self.entries.extend(materials);

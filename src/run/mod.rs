@@ -23,7 +23,7 @@ use crate::clock::Stopwatch;
 use crate::device::{Device, Stop};
 use crate::film::Film;
 use crate::job::Job;
-use crate::output::{OutputError, Records, RunLog};
+use crate::output::{self, OutputError, Records, RunLog};
 use crate::warning::Warnings;
 use read::ReadFrame;
 use slots::Slots;
@@ -111,6 +111,7 @@ pub fn render(
     let since = Stopwatch::start();
     let records = Records::read(&job.folder)?;
     check::nothing_is_lost(job, &records, options)?;
+    clean_up(job);
     let mut warnings = Warnings::default();
     let mut report = Report::new(vec![DeviceReport::new(device.info())]);
     on_event(&Event::Start {
@@ -183,6 +184,11 @@ pub fn render(
 fn panic_text(stage: &str, panic: &(dyn std::any::Any + Send)) -> String {
     let text = panic.downcast_ref::<String>().map(String::as_str).or_else(|| panic.downcast_ref::<&str>().copied());
     format!("internal error while {stage}: {}; the other frames go on, please report this", text.unwrap_or("no text"))
+}
+
+/// Clears up after dead runs. What cannot be cleared up does no harm.
+fn clean_up(job: &Job) {
+    let _ = output::clean_up(&job.folder, job.pictures.iter().map(|p| p.picture.as_path()));
 }
 
 /// Tells of those warnings that are new.
