@@ -1,13 +1,14 @@
 //! The binary tree that the wide one is collapsed from: obvhs's, uncollapsed, one triangle a leaf. Only its shape is
 //! used, never its boxes, so it is built over boxes moved to the unit cube and jittered.
 
-use super::slab::Aabb;
+use glam::Vec3A;
+use obvhs::BvhBuildParams;
+use obvhs::aabb::Aabb;
 use obvhs::bvh2::Bvh2;
 use obvhs::bvh2::reinsertion::ReinsertionOptimizer;
 use obvhs::ploc::PlocBuilder;
 use obvhs::splits::split_aabbs_preset;
 use obvhs::triangle::Triangle;
-use obvhs::{Boundable, BvhBuildParams};
 use rayon::prelude::*;
 
 /// How much time a tree may take to build for being traced faster: obvhs's presets.
@@ -67,27 +68,26 @@ pub(crate) struct Binary {
 }
 
 impl Binary {
-    /// Builds over triangles given by their corners' finite boxes, in the current rayon pool; the same for any number
-    /// of threads.
-    pub(crate) fn build(corners: &[[[f32; 3]; 3]], quality: Quality) -> Self {
-        if corners.is_empty() {
+    /// Builds over an indexed mesh in the current rayon pool; the same for any number of threads.
+    pub(crate) fn build(positions: &[[f32; 3]], triangles: &[[u32; 3]], quality: Quality) -> Self {
+        if triangles.is_empty() {
             return Self::default();
         }
-        Self::from_obvhs(&build_obvhs(corners, quality.params()))
+        Self::from_obvhs(&build_obvhs(positions, triangles, quality.params()))
     }
 
     fn from_obvhs(bvh: &Bvh2) -> Self {
-        let mut nodes: Vec<BinaryNode> = bvh
-            .nodes
-            .par_iter()
-            .with_min_len(4096)
-            .map(|n| BinaryNode {
-                half_area: n.aabb().half_area(),
-                child: if n.is_leaf() { 0 } else { n.first_index },
-                start: 0,
-                count: 1,
-            })
-            .collect();
+        // breadth first, as reinsertion leaves children anywhere
+        let mut nodes: Vec<BinaryNode> = Vec::with_capacity(bvh.nodes.len());
+        let mut places: Vec<u32> = Vec::with_capacity(bvh.nodes.len());
+        places.push(0);
+        while let Some(from) = places.get(nodes.len()).and_then(|&p| bvh.nodes.get(p as usize)) {
+            let child = if from.is_leaf() { 0 } else { places.len() as u32 };
+            nodes.push(BinaryNode { half_area: from.aabb().half_area(), child, start: 0, count: 1 });
+            if child != 0 {
+                places.extend([from.first_index, from.first_index + 1]);
+            }
+        }
         for i in (0..nodes.len()).rev() {
             let child = nodes[i].child as usize;
             if child != 0 {
@@ -98,7 +98,8 @@ impl Binary {
         for i in 0..nodes.len() {
             let BinaryNode { child, start, .. } = nodes[i];
             if child == 0 {
-                order[start as usize] = bvh.primitive_indices[bvh.nodes[i].first_index as usize];
+                order[start as usize] =
+                    bvh.primitive_indices[bvh.nodes[places[i] as usize].first_index as usize];
             } else {
                 nodes[child as usize].start = start;
                 nodes[child as usize + 1].start = start + nodes[child as usize].count;
@@ -108,20 +109,28 @@ impl Binary {
     }
 }
 
-fn build_obvhs(corners: &[[[f32; 3]; 3]], params: BvhBuildParams) -> Bvh2 {
-    let frame = UnitCube::of(corners);
-    let mut indices: Vec<u32> = (0..corners.len() as u32).collect();
-    let mut boxes: Vec<obvhs::aabb::Aabb>;
+/// Triangles that are handled together by one thread, at least.
+const GRAIN: usize = 4096;
+
+fn build_obvhs(positions: &[[f32; 3]], triangles: &[[u32; 3]], params: BvhBuildParams) -> Bvh2 {
+    // what is not finite is never hit and may stand anywhere
+    let finite = |p: [f32; 3]| Vec3A::from_array(p.map(|x| if x.is_finite() { x } else { 0.0 }));
+    let corners = |t: &[u32; 3]| t.map(|i| finite(positions[i as usize]));
+    let whole = triangles.par_iter().with_min_len(GRAIN).map(|t| Aabb::from_points(&corners(t)));
+    let cube = UnitCube::of(&whole.reduce(|| Aabb::INVALID, |a, b| a.union(&b)));
+    let triangle = |t: &[u32; 3]| {
+        let [v0, v1, v2] = corners(t).map(|p| cube.point(p));
+        Triangle { v0, v1, v2 }
+    };
+    let mut boxes: Vec<Aabb> = triangles.par_iter().with_min_len(GRAIN).map(|t| triangle(t).aabb()).collect();
+    let mut indices: Vec<u32> = (0..triangles.len() as u32).collect();
     if params.pre_split {
-        let triangles: Vec<Triangle> = corners.par_iter().map(|c| frame.triangle(c)).collect();
-        boxes = triangles.par_iter().map(Boundable::aabb).collect();
-        let mean = boxes.iter().map(obvhs::aabb::Aabb::half_area).sum::<f32>() / boxes.len() as f32;
-        let largest = boxes.iter().map(obvhs::aabb::Aabb::half_area).fold(0.0, f32::max);
+        let triangles: Vec<Triangle> = triangles.par_iter().map(triangle).collect();
+        let mean = boxes.iter().map(Aabb::half_area).sum::<f32>() / boxes.len() as f32;
+        let largest = boxes.iter().map(Aabb::half_area).fold(0.0, f32::max);
         split_aabbs_preset(&mut boxes, &mut indices, &triangles, mean, largest);
-    } else {
-        boxes = corners.par_iter().with_min_len(4096).map(|c| frame.triangle(c).aabb()).collect();
     }
-    boxes.par_iter_mut().with_min_len(4096).enumerate().for_each(|(i, b)| jitter(b, i as u32));
+    boxes.par_iter_mut().with_min_len(GRAIN).enumerate().for_each(|(i, b)| jitter(b, i as u32));
 
     let mut bvh = PlocBuilder::with_capacity(boxes.len()).build(
         params.ploc_search_distance,
@@ -132,7 +141,6 @@ fn build_obvhs(corners: &[[[f32; 3]; 3]], params: BvhBuildParams) -> Bvh2 {
     );
     if params.reinsertion_batch_ratio > 0.0 {
         ReinsertionOptimizer::default().run(&mut bvh, params.reinsertion_batch_ratio, None);
-        bvh.reorder_in_stack_traversal_order();
     }
     bvh
 }
@@ -140,35 +148,28 @@ fn build_obvhs(corners: &[[[f32; 3]; 3]], params: BvhBuildParams) -> Bvh2 {
 /// Moves and scales a scene (all axes alike) into the unit cube, so that no area overflows or underflows and floats are
 /// fine where the triangles are.
 struct UnitCube {
-    min: [f32; 3],
+    half_min: Vec3A,
     scale: f32,
 }
 
 impl UnitCube {
-    fn of(corners: &[[[f32; 3]; 3]]) -> Self {
-        let whole = corners
-            .par_iter()
-            .with_min_len(4096)
-            .map(|c| Aabb::of_points(c))
-            .reduce(|| Aabb::EMPTY, |a, b| a.union(&b));
-        let extent = (0..3).map(|k| 0.5 * whole.max[k] - 0.5 * whole.min[k]).fold(0.0, f32::max);
-        Self { min: whole.min, scale: if extent > f32::MIN_POSITIVE { 0.5 / extent } else { 0.0 } }
+    fn of(whole: &Aabb) -> Self {
+        let half_extent = (0.5 * whole.max - 0.5 * whole.min).max_element();
+        Self {
+            half_min: 0.5 * whole.min,
+            scale: if half_extent > f32::MIN_POSITIVE { 1.0 / half_extent } else { 0.0 },
+        }
     }
 
-    fn triangle(&self, corners: &[[f32; 3]; 3]) -> Triangle {
-        let [v0, v1, v2] = corners.map(|p| {
-            glam::Vec3A::from_array(std::array::from_fn(|k| {
-                2.0 * ((0.5 * p[k] - 0.5 * self.min[k]) * self.scale)
-            }))
-        });
-        Triangle { v0, v1, v2 }
+    fn point(&self, p: Vec3A) -> Vec3A {
+        (0.5 * p - self.half_min) * self.scale
     }
 }
 
 /// Grows a box a little, each side differently. Clustering merges boxes that are each other's best partner; among equal
 /// boxes (coincident triangles) every box's best partner would be the next, one pair would be merged in each pass, and
 /// the time would be quadratic.
-fn jitter(b: &mut obvhs::aabb::Aabb, index: u32) {
+fn jitter(b: &mut Aabb, index: u32) {
     const SCENE: f32 = 1.0 / 65536.0;
     const BOX: f32 = 1.0 / 1024.0;
     let size = b.max - b.min;
@@ -178,8 +179,8 @@ fn jitter(b: &mut obvhs::aabb::Aabb, index: u32) {
         state = mix(state.wrapping_add(0x9e37_79b9));
         reach * (state >> 8) as f32 / (1 << 24) as f32
     };
-    b.min -= glam::Vec3A::new(next(), next(), next());
-    b.max += glam::Vec3A::new(next(), next(), next());
+    b.min -= Vec3A::new(next(), next(), next());
+    b.max += Vec3A::new(next(), next(), next());
 }
 
 /// Mixes the bits of an integer (Wellons' lowbias32, hash-prospector).

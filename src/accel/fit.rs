@@ -12,12 +12,9 @@ type LeafBoxes = (Aabb, Aabb);
 
 impl Tree {
     pub(crate) fn fit(shape: Shape, positions: &[[f32; 3]], triangles: &[[u32; 3]]) -> Self {
-        let (blocks, boxes): (Vec<Block>, Vec<LeafBoxes>) = shape
-            .blocks
-            .into_par_iter()
-            .with_min_len(512)
-            .map(|lanes| fit_block(lanes, positions, triangles))
-            .unzip();
+        let (mut blocks, mut boxes): (Vec<Block>, Vec<LeafBoxes>) = (Vec::new(), Vec::new());
+        let lanes = shape.blocks.into_par_iter().with_min_len(512);
+        lanes.map(|lanes| fit_block(lanes, positions, triangles)).unzip_into_vecs(&mut blocks, &mut boxes);
         let mut nodes: Vec<Node> = shape
             .children
             .into_iter()

@@ -76,7 +76,7 @@ impl Tree {
     /// Builds over an indexed mesh in the current rayon pool; indices must be within the positions. The tree is the
     /// same for any number of threads. A triangle without area or with a corner that is not finite is never hit.
     pub fn build(positions: &[[f32; 3]], triangles: &[[u32; 3]], quality: Quality) -> Self {
-        let shape = Shape::collapse(&Binary::build(&finite_corners(positions, triangles), quality));
+        let shape = Shape::collapse(&Binary::build(positions, triangles, quality));
         Self::fit(shape, positions, triangles)
     }
 
@@ -102,15 +102,4 @@ impl Tree {
     pub fn vertex_box(&self) -> Aabb {
         self.vertex_box
     }
-}
-
-/// Corners for the builder, which takes finite ones only; where they are not, the triangle is never hit and may stand
-/// anywhere.
-fn finite_corners(positions: &[[f32; 3]], triangles: &[[u32; 3]]) -> Vec<[[f32; 3]; 3]> {
-    use rayon::prelude::*;
-    triangles
-        .par_iter()
-        .with_min_len(4096)
-        .map(|t| t.map(|i| positions[i as usize].map(|x| if x.is_finite() { x } else { 0.0 })))
-        .collect()
 }
