@@ -11,7 +11,10 @@ fn counts(t: &Path, input: &Path, more: &[&str]) -> (u64, u64) {
     let r = t.join("r.json");
     render(t, input, "out", &[&SMALL[..], more, &["--report", r.to_str().unwrap()]].concat(), 0);
     let totals = &report(&r)["totals"];
-    (totals["rendered"].as_u64().unwrap() + totals["copied"].as_u64().unwrap(), totals["resumed"].as_u64().unwrap())
+    (
+        totals["rendered"].as_u64().unwrap() + totals["copied"].as_u64().unwrap(),
+        totals["resumed"].as_u64().unwrap(),
+    )
 }
 
 #[test]
@@ -39,7 +42,8 @@ fn only_what_changed_is_rendered_again() {
     std::fs::write(&obj, text.replacen("v ", "v 0.1 1.3 0.1\n#", 1)).unwrap();
     again(1, &[], "a vertex");
     let mtl = input.join("wave.mtl");
-    std::fs::write(&mtl, std::fs::read_to_string(&mtl).unwrap().replace("0.8 0.3 0.2", "0.1 0.3 0.9")).unwrap();
+    std::fs::write(&mtl, std::fs::read_to_string(&mtl).unwrap().replace("0.8 0.3 0.2", "0.1 0.3 0.9"))
+        .unwrap();
     again(4, &[], "a material");
     again(4, &["--samples", "2"], "an option");
     again(4, &["--samples", "2", "--overwrite"], "--overwrite");
@@ -101,7 +105,8 @@ fn foreign_files_and_inputs_are_kept() {
     // a texture that lies where the picture would go
     let card = t.join("card");
     std::fs::create_dir(&card).unwrap();
-    std::fs::write(card.join("card.obj"), "mtllib c.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl c\nf 1 2 3\n").unwrap();
+    std::fs::write(card.join("card.obj"), "mtllib c.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl c\nf 1 2 3\n")
+        .unwrap();
     std::fs::write(card.join("c.mtl"), "newmtl c\nmap_Kd card.png\n").unwrap();
     std::fs::write(card.join("card.png"), "texture").unwrap();
     let said = render(t, &card, "card", &[&SMALL[..], &["--overwrite"]].concat(), 2).stderr;
@@ -132,7 +137,8 @@ fn signals_stop_a_run_and_it_goes_on_later() {
         while pictures_there(&t.join("out")) == 0 && child.try_wait().unwrap().is_none() {
             std::hint::spin_loop();
         }
-        let kill = std::process::Command::new("kill").arg(signal).arg(child.id().to_string()).status().unwrap();
+        let kill =
+            std::process::Command::new("kill").arg(signal).arg(child.id().to_string()).status().unwrap();
         assert!(kill.success());
         assert_eq!(child.wait().unwrap().code(), Some(status));
         let there = pictures(&t.join("out"));

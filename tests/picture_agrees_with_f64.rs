@@ -60,7 +60,7 @@ fn geometry(random: &mut Random) -> Geometry {
             ns: (20.0 * random.next()).floor(),
             d: if i % 4 == 0 { random.next() } else { 1.0 },
             illum: (i % 8).min(2) as u8,
-            maps: vec![],
+            ..Material::default()
         }));
     }
     Geometry {

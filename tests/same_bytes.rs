@@ -13,8 +13,13 @@ fn order_threads_chunks_and_cold_give_the_same_bytes() {
     render(t, &input, "a", &base, 0);
     let a = pictures(&t.join("a"));
     assert_eq!(a.values().collect::<std::collections::BTreeSet<_>>().len(), 7, "seven different pictures");
-    let ways: [&[&str]; 5] =
-        [&["--threads", "1"], &["--threads", "2", "--order", "shuffle"], &["--order", "reverse"], &["--no-cache"], &["--cold"]];
+    let ways: [&[&str]; 5] = [
+        &["--threads", "1"],
+        &["--threads", "2", "--order", "shuffle"],
+        &["--order", "reverse"],
+        &["--no-cache"],
+        &["--cold"],
+    ];
     for (i, more) in ways.into_iter().enumerate() {
         render(t, &input, &format!("b{i}"), &with(more), 0);
         assert_same(&a, &pictures(&t.join(format!("b{i}"))), &more.join(" "));

@@ -38,7 +38,13 @@ pub(super) fn inspect(args: &RenderArgs, global: &Global) -> Result<ExitCode> {
             Ok(frame) => {
                 let same_sequence = before.as_ref().filter(|(s, _)| *s == picture.sequence);
                 let seen = look(same_sequence.map(|(_, f)| f), &frame);
-                tell(&job, picture, &seen, before.as_ref().is_none_or(|(s, _)| *s != picture.sequence), global);
+                tell(
+                    &job,
+                    picture,
+                    &seen,
+                    before.as_ref().is_none_or(|(s, _)| *s != picture.sequence),
+                    global,
+                );
                 before = Some((picture.sequence, frame));
             }
         }
@@ -79,7 +85,10 @@ fn tell(job: &Job, picture: &Picture, seen: &Seen, first: bool, global: &Global)
     }
     if first {
         println!("{}", sequence.name);
-        println!("{:>24} {:>10} {:>10} {:>7} {:>9}  change", "frame", "triangles", "vertices", "meshes", "materials");
+        println!(
+            "{:>24} {:>10} {:>10} {:>7} {:>9}  change",
+            "frame", "triangles", "vertices", "meshes", "materials"
+        );
     }
     println!(
         "{source:>24} {:>10} {:>10} {:>7} {:>9}  {}",
@@ -102,6 +111,7 @@ fn words(c: &Change) -> String {
         (c.materials, "materials"),
         (c.textures, "textures"),
     ];
-    let list: Vec<String> = counts.iter().filter(|(n, _)| *n > 0).map(|(n, word)| format!("{n} {word}")).collect();
+    let list: Vec<String> =
+        counts.iter().filter(|(n, _)| *n > 0).map(|(n, word)| format!("{n} {word}")).collect();
     if list.is_empty() { "nothing in it".to_string() } else { list.join(", ") }
 }

@@ -23,8 +23,16 @@ const EXIT_NO_DEVICE: u8 = 3;
 
 /// Renders animation sequences (folders of OBJ frames) to pictures by ray tracing, headless.
 #[derive(Parser, Debug)]
-#[command(name = "rentix", version, propagate_version = true, args_override_self = true, max_term_width = 100)]
-#[command(after_help = "Example: rentix render walk/ -o out/walk --size fullhd\n\nExit status: 0 all is there, 1 some frames failed, 2 nothing was tried, 3 no device could do it, 130/143 stopped.")]
+#[command(
+    name = "rentix",
+    version,
+    propagate_version = true,
+    args_override_self = true,
+    max_term_width = 100
+)]
+#[command(
+    after_help = "Example: rentix render walk/ -o out/walk --size fullhd\n\nExit status: 0 all is there, 1 some frames failed, 2 nothing was tried, 3 no device could do it, 130/143 stopped."
+)]
 pub struct Cli {
     #[command(flatten)]
     global: Global,
@@ -60,19 +68,25 @@ enum Color {
 #[derive(Subcommand, Debug)]
 enum Command {
     /// Renders sequences to pictures
-    #[command(after_help = "Examples:\n  rentix render walk/\n  rentix render 'walk/walk_####.obj' --frames 1-100x2 --size 1920x1080 --samples 16 -o out\n  rentix render job.yaml")]
+    #[command(
+        after_help = "Examples:\n  rentix render walk/\n  rentix render 'walk/walk_####.obj' --frames 1-100x2 --size 1920x1080 --samples 16 -o out\n  rentix render job.yaml"
+    )]
     Render(Box<render_args::RenderArgs>),
     /// Tells what is in a sequence and what changes from frame to frame; renders nothing
     #[command(after_help = "Example: rentix inspect walk/")]
     Inspect(Box<render_args::RenderArgs>),
     /// Compares two pictures or two folders of pictures
-    #[command(after_help = "Example: rentix compare out/a out/b --flip 0.005\n\nExit status: 0 equal (or within --flip), 1 they differ, 2 unreadable.")]
+    #[command(
+        after_help = "Example: rentix compare out/a out/b --flip 0.005\n\nExit status: 0 equal (or within --flip), 1 they differ, 2 unreadable."
+    )]
     Compare(compare::CompareArgs),
     /// Lists what can render
     #[command(after_help = "Example: rentix devices --json")]
     Devices,
     /// Prints a completion script for a shell
-    #[command(after_help = "Example: rentix completions bash > ~/.local/share/bash-completion/completions/rentix")]
+    #[command(
+        after_help = "Example: rentix completions bash > ~/.local/share/bash-completion/completions/rentix"
+    )]
     Completions {
         /// Which shell
         shell: clap_complete::Shell,

@@ -108,7 +108,10 @@ impl Progress {
             self.told_s = self.since.s();
             let rate = self.ended as f64 / self.told_s;
             let left_s = (self.frames - self.ended.min(self.frames)) as f64 / rate;
-            self.line(&format!("{}/{} frames, {rate:.2} frames/s, {left_s:.0} s left", self.ended, self.frames));
+            self.line(&format!(
+                "{}/{} frames, {rate:.2} frames/s, {left_s:.0} s left",
+                self.ended, self.frames
+            ));
         }
     }
 

@@ -83,7 +83,9 @@ fn conclude(job: &Job, outcome: &Outcome, global: &Global, stop: &stop::OnSignal
     let failed: Vec<&FrameReport> = outcome.failed().collect();
     if !global.quiet && !global.json {
         let mut line = format!("{} rendered", totals.rendered);
-        for (count, word) in [(totals.resumed, "found finished"), (totals.copied, "copied"), (totals.failed, "failed")] {
+        for (count, word) in
+            [(totals.resumed, "found finished"), (totals.copied, "copied"), (totals.failed, "failed")]
+        {
             if count > 0 {
                 let _ = write!(line, ", {count} {word}");
             }
@@ -91,7 +93,12 @@ fn conclude(job: &Job, outcome: &Outcome, global: &Global, stop: &stop::OnSignal
         eprintln!("{line} in {:.1} s: {}", outcome.report.wall_s, job.folder.display());
     }
     if !failed.is_empty() {
-        eprintln!("{} of {} frames are missing; render them with {}", failed.len(), job.pictures.len(), frame_list(&failed));
+        eprintln!(
+            "{} of {} frames are missing; render them with {}",
+            failed.len(),
+            job.pictures.len(),
+            frame_list(&failed)
+        );
     }
     if outcome.stopped {
         return ExitCode::from(stop.exit_status());

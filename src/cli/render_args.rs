@@ -7,6 +7,7 @@ use std::path::PathBuf;
 
 /// What `render` takes. Options win over the job file.
 #[derive(Args, Debug)]
+#[allow(clippy::struct_excessive_bools, reason = "each is a switch that a user types")]
 pub(super) struct RenderArgs {
     /// Folders of OBJ frames, patterns (walk_####.obj, walk_%04d.obj, 'walk/*.obj'), OBJ files, job files (.yaml)
     #[arg(value_name = "INPUT")]
@@ -15,7 +16,7 @@ pub(super) struct RenderArgs {
     /// Where pictures go [default: out/NAME]
     #[arg(short = 'o', value_name = "DIR", help_heading = "Output")]
     pub output: Option<PathBuf>,
-    /// Width and height: WxH, hd (1280x720) or fullhd (1920x1080) [default: hd]
+    /// Width and height: 640x360, hd (1280x720) or fullhd (1920x1080) [default: hd]
     #[arg(long, value_parser = size::pixels, value_name = "SIZE", help_heading = "Output")]
     pub size: Option<[u32; 2]>,
     /// Picture format: png, exr, ppm [default: png]

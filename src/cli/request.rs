@@ -32,7 +32,11 @@ fn options(args: &RenderArgs) -> Result<Options> {
         format: read("--format", args.format.as_deref(), settings::format_word)?,
         name: args.name.clone(),
         alpha: args.alpha.then_some(true),
-        bits: args.bits.map(|b| settings::bits(f64::from(b))).transpose().map_err(|e| anyhow!("--bits: {e}"))?,
+        bits: args
+            .bits
+            .map(|b| settings::bits(f64::from(b)))
+            .transpose()
+            .map_err(|e| anyhow!("--bits: {e}"))?,
         quality: ranged("--quality", args.quality, &limits::QUALITY)?,
         camera: None::<CameraChoice>,
         eye: read("--eye", args.eye.as_deref(), settings::vector)?,

@@ -24,7 +24,8 @@ impl OnSignals {
 pub(super) fn on_signals() -> Result<OnSignals> {
     use signal_hook::consts::{SIGINT, SIGTERM};
     let on = OnSignals { asked: Arc::default(), signal: Arc::default() };
-    let mut signals = signal_hook::iterator::Signals::new([SIGINT, SIGTERM]).context("signals cannot be caught")?;
+    let mut signals =
+        signal_hook::iterator::Signals::new([SIGINT, SIGTERM]).context("signals cannot be caught")?;
     let (asked, signal) = (Arc::clone(&on.asked), Arc::clone(&on.signal));
     std::thread::spawn(move || {
         for s in signals.forever() {

@@ -86,15 +86,15 @@ fn mesh_faces<'a>(g: &'a Geometry, m: &Mesh) -> (&'a [u32], &'a [u32]) {
 fn same_corners(ga: &Geometry, ma: &Mesh, gb: &Geometry, mb: &Mesh) -> bool {
     let (_, corners) = mesh_faces(ga, ma);
     (ga.positions == gb.positions
-        || corners.iter().all(|&i| {
-            bits(&ga.positions.0[i as usize]) == bits(&gb.positions.0[i as usize])
-        }))
+        || corners.iter().all(|&i| bits(&ga.positions.0[i as usize]) == bits(&gb.positions.0[i as usize])))
         && (ga.triangles == gb.triangles || triangles(&ga.triangles.0, ma) == triangles(&gb.triangles.0, mb))
-        && same_attribute::<Texcoords>(&ga.texcoords, ma, &gb.texcoords, mb)
-        && same_attribute::<Normals>(&ga.normals, ma, &gb.normals, mb)
+        && same_attribute::<Texcoords>(ga.texcoords.as_ref(), ma, gb.texcoords.as_ref(), mb)
+        && same_attribute::<Normals>(ga.normals.as_ref(), ma, gb.normals.as_ref(), mb)
         && (ga.colors == gb.colors
             || match (&ga.colors, &gb.colors) {
-                (Some(a), Some(b)) => corners.iter().all(|&i| bits(&a.0[i as usize]) == bits(&b.0[i as usize])),
+                (Some(a), Some(b)) => {
+                    corners.iter().all(|&i| bits(&a.0[i as usize]) == bits(&b.0[i as usize]))
+                }
                 _ => false,
             })
 }
@@ -109,16 +109,18 @@ fn triangles<'a>(all: &'a [[u32; 3]], m: &Mesh) -> &'a [[u32; 3]] {
 
 /// Whether an attribute has the same indices and the same values behind them.
 fn same_attribute<T: AttributeValues>(
-    a: &Option<Attribute<T>>,
+    a: Option<&Attribute<T>>,
     ma: &Mesh,
-    b: &Option<Attribute<T>>,
+    b: Option<&Attribute<T>>,
     mb: &Mesh,
 ) -> bool {
     match (a, b) {
         (None, None) => true,
         (Some(a), Some(b)) => {
             let (ca, cb) = (triangles(&a.corners.0, ma), triangles(&b.corners.0, mb));
-            ca == cb && (a.values == b.values || ca.as_flattened().iter().all(|&i| a.values.at(i) == b.values.at(i)))
+            ca == cb
+                && (a.values == b.values
+                    || ca.as_flattened().iter().all(|&i| a.values.at(i) == b.values.at(i)))
         }
         _ => false,
     }

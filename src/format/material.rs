@@ -261,6 +261,7 @@ fn filled_in(given: &Given, srgb: bool) -> Material {
         d: given.d.or(given.tr.map(|tr| 1.0 - tr)).unwrap_or(1.0),
         illum: given.illum.unwrap_or(if shiny { 2 } else { 1 }),
         maps: Vec::new(),
+        ..Material::default()
     }
 }
 

@@ -103,6 +103,7 @@ pub fn scan_bounds(path: &Path) -> Result<Bounds, FormatError> {
 pub fn named_files(path: &Path, materials_file: Option<&Path>) -> Vec<PathBuf> {
     let Ok(bytes) = text::read(path) else { return Vec::new() };
     let Ok(text) = Text::new(&bytes, path) else { return Vec::new() };
-    let options = ReadOptions { materials_file: materials_file.map(Path::to_path_buf), ..ReadOptions::default() };
+    let options =
+        ReadOptions { materials_file: materials_file.map(Path::to_path_buf), ..ReadOptions::default() };
     material::Loader::new(path, &options).named_files(&obj::library_statements(&text))
 }

@@ -1,6 +1,6 @@
 //! The auto camera and the auto light (CONTRACT 5): where they stand follows from what is in the sequence.
 
-use super::{Layer, Sequence, Settings};
+use super::{Layer, Settings};
 use crate::math::{Bounds, DVec3, Vec3};
 use crate::scene::{Camera, Falloff, Light, Object};
 use glam::DQuat;
@@ -81,23 +81,18 @@ pub fn glow(objects: &[Object]) -> Option<(DVec3, DVec3)> {
 /// The light of a sequence whose first frame is seen by this camera, and glows as given.
 pub fn light(first: &Camera, glow: Option<(DVec3, DVec3)>) -> Light {
     let rho = (first.look_at - first.eye).length() * (0.5 * first.fov_deg.to_radians()).sin();
-    let (position, color) = match glow {
-        Some((centroid, ke)) => {
-            let towards = (first.look_at - centroid).normalize_or_zero();
-            (centroid + 0.02 * rho * towards, ke / ke.max_element())
-        }
-        None => {
-            let (right, up, _) = first.axes();
-            (first.eye + rho * (up - right), DVec3::ONE)
-        }
+    let (position, color) = if let Some((centroid, ke)) = glow {
+        let towards = (first.look_at - centroid).normalize_or_zero();
+        (centroid + 0.02 * rho * towards, ke / ke.max_element())
+    } else {
+        let (right, up, _) = first.axes();
+        (first.eye + rho * (up - right), DVec3::ONE)
     };
-    Light::Point { position: position.as_vec3(), color: color.as_vec3(), intensity: 1.0, falloff: Falloff::None }
-}
-
-impl Sequence {
-    /// Whether a picture of it may need [`camera`]; the light of the first frame may stand on it.
-    pub fn needs_bounds(&self, settings: &Settings) -> bool {
-        settings.camera_at(None).is_none()
+    Light::Point {
+        position: position.as_vec3(),
+        color: color.as_vec3(),
+        intensity: 1.0,
+        falloff: Falloff::None,
     }
 }
 
@@ -127,7 +122,8 @@ mod tests {
 
     #[test]
     fn the_light_by_hand() {
-        let camera = Camera { eye: DVec3::new(0.0, 0.0, 4.0), look_at: DVec3::ZERO, up: DVec3::Y, fov_deg: 60.0 };
+        let camera =
+            Camera { eye: DVec3::new(0.0, 0.0, 4.0), look_at: DVec3::ZERO, up: DVec3::Y, fov_deg: 60.0 };
         // ρ = 4 · sin 30° = 2; right is x, up is y
         let Light::Point { position, color, .. } = light(&camera, None) else { panic!() };
         assert!((position - Vec3::new(-2.0, 2.0, 4.0)).length() < 1e-6 && color == Vec3::ONE);

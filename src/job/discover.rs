@@ -35,7 +35,11 @@ pub(super) struct Taking {
 }
 
 /// Finds the sequences of an INPUT.
-pub(super) fn discover(input: &Path, taking: Taking, warnings: &mut Warnings) -> Result<Vec<Files>, JobError> {
+pub(super) fn discover(
+    input: &Path,
+    taking: Taking,
+    warnings: &mut Warnings,
+) -> Result<Vec<Files>, JobError> {
     let found = if input.is_dir() {
         let files = list(input, &|name| is_obj(Path::new(name)))?;
         if files.is_empty() {
@@ -56,7 +60,8 @@ pub(super) fn discover(input: &Path, taking: Taking, warnings: &mut Warnings) ->
         vec![input.to_path_buf()]
     } else if let Some(pattern) = Pattern::of(input) {
         let folder = input.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
-        let files = list(folder, &|name| is_obj(Path::new(name)) && pattern.matches(name.as_encoded_bytes()))?;
+        let files =
+            list(folder, &|name| is_obj(Path::new(name)) && pattern.matches(name.as_encoded_bytes()))?;
         if files.is_empty() {
             return Err(JobError::NoMatch(input.to_path_buf()));
         }
@@ -91,7 +96,11 @@ fn in_natural_order(found: &[PathBuf], names: &[Name], name: String) -> Files {
 }
 
 fn frame_file(number: Option<i64>, path: &Path) -> FrameFile {
-    FrameFile { number, path: path.to_path_buf(), stem: String::from_utf8_lossy(stem_bytes(path)).into_owned() }
+    FrameFile {
+        number,
+        path: path.to_path_buf(),
+        stem: String::from_utf8_lossy(stem_bytes(path)).into_owned(),
+    }
 }
 
 fn stem_bytes(path: &Path) -> &[u8] {
@@ -101,7 +110,9 @@ fn stem_bytes(path: &Path) -> &[u8] {
 /// The name of the folder that an INPUT is or lies in.
 pub(super) fn folder_name(input: &Path) -> String {
     let folder = if input.is_dir() { Some(input) } else { input.parent() };
-    let real = folder.map(|f| if f.as_os_str().is_empty() { Path::new(".") } else { f }).and_then(|f| f.canonicalize().ok());
+    let real = folder
+        .map(|f| if f.as_os_str().is_empty() { Path::new(".") } else { f })
+        .and_then(|f| f.canonicalize().ok());
     let name = real.as_deref().and_then(Path::file_name).map(|n| n.to_string_lossy().into_owned());
     name.unwrap_or_else(|| "sequence".to_string())
 }
@@ -131,7 +142,12 @@ fn list(folder: &Path, wanted: &dyn Fn(&std::ffi::OsStr) -> bool) -> Result<Vec<
 }
 
 /// Two files of one number are an error, gaps a warning; with strict an error.
-fn check_numbers(sequence: &Files, input: &Path, strict: bool, warnings: &mut Warnings) -> Result<(), JobError> {
+fn check_numbers(
+    sequence: &Files,
+    input: &Path,
+    strict: bool,
+    warnings: &mut Warnings,
+) -> Result<(), JobError> {
     let numbers: Vec<i64> = sequence.files.iter().filter_map(|f| f.number).collect();
     if let Some(i) = numbers.windows(2).position(|w| w[0] == w[1]) {
         let name = |k: usize| sequence.files[k].path.clone();
@@ -201,7 +217,8 @@ impl Pattern {
                 b'%' => {
                     let width = rest[1..].iter().take_while(|b| b.is_ascii_digit()).count();
                     if rest.get(1 + width) == Some(&b'd') {
-                        let digits = rest[1..=width].iter().fold(0, |n, b| (n * 10 + usize::from(b - b'0')).min(99));
+                        let digits =
+                            rest[1..=width].iter().fold(0, |n, b| (n * 10 + usize::from(b - b'0')).min(99));
                         (Piece::Number { digits: digits.max(1) }, width + 2)
                     } else {
                         (Piece::Byte(b'%'), 1)
@@ -264,7 +281,8 @@ mod tests {
         assert_eq!(numbers(&t.path().join("w_%02d.obj"), TAKING), [[Some(10)]]);
         let one = Taking { one_sequence: true, ..TAKING };
         assert_eq!(numbers(t.path(), one), [[Some(1), Some(2), Some(3)]]);
-        let Err(JobError::NoMatch(_)) = discover(&t.path().join("y_#.obj"), TAKING, &mut Warnings::default()) else {
+        let Err(JobError::NoMatch(_)) = discover(&t.path().join("y_#.obj"), TAKING, &mut Warnings::default())
+        else {
             panic!("a pattern that matches nothing")
         };
     }

@@ -28,7 +28,8 @@ impl Name {
             }
             let digits_end = i + stem[i..].iter().take_while(|b| b.is_ascii_digit()).count();
             if digits_end - i <= MAX_DIGITS {
-                let is_signed = i > text_start && stem[i - 1] == b'-' && (i < 2 || !stem[i - 2].is_ascii_alphanumeric());
+                let is_signed =
+                    i > text_start && stem[i - 1] == b'-' && (i < 2 || !stem[i - 2].is_ascii_alphanumeric());
                 let magnitude = stem[i..digits_end].iter().fold(0, |n, b| n * 10 + i64::from(b - b'0'));
                 name.texts.push(stem[text_start..i - usize::from(is_signed)].to_vec());
                 name.numbers.push(if is_signed { -magnitude } else { magnitude });
@@ -54,7 +55,9 @@ impl Name {
         let mut bytes = Vec::new();
         for (i, text) in self.texts.iter().enumerate() {
             bytes.extend_from_slice(text);
-            if i != run && let Some(n) = self.numbers.get(i) {
+            if i != run
+                && let Some(n) = self.numbers.get(i)
+            {
                 bytes.extend_from_slice(n.to_string().as_bytes());
             }
         }
@@ -85,7 +88,10 @@ pub(super) fn group(names: &[Name]) -> Vec<Group> {
         let differs = |run: usize| members.iter().any(|&i| numbers(i)[run] != numbers(first)[run]);
         let runs = numbers(first).len();
         let Some(frame_run) = (0..runs).rev().find(|&r| differs(r)).or(runs.checked_sub(1)) else {
-            groups.push(Group { text: names[first].without(usize::MAX), members: members.iter().map(|&i| (None, i)).collect() });
+            groups.push(Group {
+                text: names[first].without(usize::MAX),
+                members: members.iter().map(|&i| (None, i)).collect(),
+            });
             continue;
         };
         let mut by_rest: BTreeMap<Vec<i64>, Vec<usize>> = BTreeMap::new();
@@ -129,7 +135,10 @@ mod tests {
     #[test]
     fn other_text_or_other_numbers_are_other_sequences() {
         assert_eq!(groups(&["a_1", "b_1", "a_2", "b_2"]), [one("a", &[1, 2]), one("b", &[1, 2])]);
-        assert_eq!(groups(&["s1_1", "s1_2", "s2_1", "s10_1"]), [one("s1", &[1, 2]), one("s2", &[1]), one("s10", &[1])]);
+        assert_eq!(
+            groups(&["s1_1", "s1_2", "s2_1", "s10_1"]),
+            [one("s1", &[1, 2]), one("s2", &[1]), one("s10", &[1])]
+        );
         assert_eq!(groups(&["head-01-anger", "head-02-cry", "head"]).len(), 3);
     }
 
@@ -148,6 +157,14 @@ mod tests {
         let mut names: Vec<Name> = ["b", "A10", "a9", "a"].iter().map(|s| Name::of(s.as_bytes())).collect();
         names.sort_by(Name::natural_order);
         let order: Vec<_> = names.iter().map(|n| (n.texts[0].clone(), n.numbers.last().copied())).collect();
-        assert_eq!(order, [(b"a".to_vec(), None), (b"a".to_vec(), Some(9)), (b"A".to_vec(), Some(10)), (b"b".to_vec(), None)]);
+        assert_eq!(
+            order,
+            [
+                (b"a".to_vec(), None),
+                (b"a".to_vec(), Some(9)),
+                (b"A".to_vec(), Some(10)),
+                (b"b".to_vec(), None)
+            ]
+        );
     }
 }

@@ -56,7 +56,14 @@ impl FromStr for FrameSet {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        text.split(',').map(|part| run(part.trim()).ok_or_else(|| format!("`{part}` is not a frame number or range; write 1-100, 1-100x2 or 5,7,9-12"))).collect::<Result<_, _>>().map(Self)
+        text.split(',')
+            .map(|part| {
+                run(part.trim()).ok_or_else(|| {
+                    format!("`{part}` is not a frame number or range; write 1-100, 1-100x2 or 5,7,9-12")
+                })
+            })
+            .collect::<Result<_, _>>()
+            .map(Self)
     }
 }
 
@@ -66,7 +73,10 @@ fn run(text: &str) -> Option<Run> {
         None => (text, 1),
     };
     // the dash of a range stands behind a digit, that of a negative number does not
-    let dash = range.bytes().enumerate().position(|(i, b)| b == b'-' && i > 0 && range.as_bytes()[i - 1].is_ascii_digit());
+    let dash = range
+        .bytes()
+        .enumerate()
+        .position(|(i, b)| b == b'-' && i > 0 && range.as_bytes()[i - 1].is_ascii_digit());
     let number = |s: &str| s.parse::<i64>().ok().filter(|n| n.abs() < 1 << 53);
     let (first, last) = match dash {
         Some(i) => (number(&range[..i])?, number(&range[i + 1..])?),

@@ -121,7 +121,10 @@ pub mod limits {
 
     /// Whether a number is within a range; else what to say.
     pub fn within(x: f64, range: &RangeInclusive<f64>) -> Result<f64, String> {
-        if range.contains(&x) { Ok(x) } else { Err(format!("{x} is out of range: from {} to {}", range.start(), range.end())) }
+        if range.contains(&x) {
+            Ok(x)
+        } else {
+            Err(format!("{x} is out of range: from {} to {}", range.start(), range.end()))
+        }
     }
 }
-

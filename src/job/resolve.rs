@@ -11,7 +11,14 @@ use std::sync::Arc;
 
 /// Works out what is to be rendered; nothing is written.
 pub fn resolve(request: &Request) -> Result<Job, JobError> {
-    let mut job = Resolving { request, warnings: Warnings::default(), inputs: Vec::new(), sequences: Vec::new(), pictures: Vec::new(), shared: None };
+    let mut job = Resolving {
+        request,
+        warnings: Warnings::default(),
+        inputs: Vec::new(),
+        sequences: Vec::new(),
+        pictures: Vec::new(),
+        shared: None,
+    };
     let (files, inputs): (Vec<&PathBuf>, Vec<&PathBuf>) =
         request.inputs.iter().chain(&request.job_file).partition(|i| is_job_file(i));
     let job_file = match files.as_slice() {
@@ -20,7 +27,11 @@ pub fn resolve(request: &Request) -> Result<Job, JobError> {
             job.inputs.push((*path).clone());
             file::read(path)?
         }
-        _ => return Err(JobError::Options("more than one job file; render them one after the other".to_string())),
+        _ => {
+            return Err(JobError::Options(
+                "more than one job file; render them one after the other".to_string(),
+            ));
+        }
     };
     if inputs.is_empty() && files.is_empty() {
         return Err(JobError::NoInput);
@@ -35,7 +46,8 @@ pub fn resolve(request: &Request) -> Result<Job, JobError> {
         let own: Vec<&PathBuf> = job_file.sequence.iter().collect();
         for input in if inputs.is_empty() { own } else { inputs } {
             let sequences = discover::discover(input, job.taking(), &mut job.warnings)?;
-            let default = if input.is_dir() { discover::folder_name(input) } else { sequences[0].name.clone() };
+            let default =
+                if input.is_dir() { discover::folder_name(input) } else { sequences[0].name.clone() };
             let name = name.get_or_insert(default);
             for files in sequences {
                 job.add_sequence(name, files, &job_file)?;
@@ -48,9 +60,22 @@ pub fn resolve(request: &Request) -> Result<Job, JobError> {
 
     job.place_in_folders()?;
     job.choose(job_file.frames.as_ref())?;
-    job.inputs.extend(job.sequences.iter().flat_map(|s| &s.layers).flat_map(|l| l.files.iter().map(|f| f.path.clone()).chain(l.materials.clone())).collect::<Vec<_>>());
+    job.inputs.extend(
+        job.sequences
+            .iter()
+            .flat_map(|s| &s.layers)
+            .flat_map(|l| l.files.iter().map(|f| f.path.clone()).chain(l.materials.clone()))
+            .collect::<Vec<_>>(),
+    );
     let folder = request.folder.clone().or(job_file.folder).unwrap_or_else(|| Path::new("out").join(&name));
-    Ok(Job { name, folder, sequences: job.sequences, pictures: job.pictures, inputs: job.inputs, warnings: job.warnings })
+    Ok(Job {
+        name,
+        folder,
+        sequences: job.sequences,
+        pictures: job.pictures,
+        inputs: job.inputs,
+        warnings: job.warnings,
+    })
 }
 
 /// No job of layers has more pictures.
@@ -96,15 +121,26 @@ impl Resolving<'_> {
         for given in &job.layers {
             let mut found = discover::discover(&given.sequence, self.taking(), &mut self.warnings)?;
             if found.len() > 1 {
-                let text = format!("layer {} holds {} sequences; name one by a pattern", given.sequence.display(), found.len());
+                let text = format!(
+                    "layer {} holds {} sequences; name one by a pattern",
+                    given.sequence.display(),
+                    found.len()
+                );
                 return Err(JobError::Options(text));
             }
             let files = found.remove(0);
             let name = given.name.clone().unwrap_or(files.name);
-            layers.push(Layer { name, files: files.files, materials: given.materials.clone(), placed: given.placed.clone() });
+            layers.push(Layer {
+                name,
+                files: files.files,
+                materials: given.materials.clone(),
+                placed: given.placed.clone(),
+            });
         }
         if job.frames.as_ref().is_some_and(|set| set.len() > MAX_FRAMES) {
-            return Err(JobError::Options(format!("the job asks for more than {MAX_FRAMES} frames; split it")));
+            return Err(JobError::Options(format!(
+                "the job asks for more than {MAX_FRAMES} frames; split it"
+            )));
         }
         let frames = layer_frames(&layers, job);
         let first = frames.first().copied().unwrap_or(1);
@@ -141,7 +177,12 @@ impl Resolving<'_> {
     }
 
     /// Defaults, then the job, then its overrides in turn, then the command line.
-    fn settings(&mut self, job: &JobFile, frame: Option<i64>, stem: Option<&str>) -> Result<Arc<Settings>, JobError> {
+    fn settings(
+        &mut self,
+        job: &JobFile,
+        frame: Option<i64>,
+        stem: Option<&str>,
+    ) -> Result<Arc<Settings>, JobError> {
         if let Some(shared) = &self.shared {
             return Ok(Arc::clone(shared));
         }
@@ -160,7 +201,8 @@ impl Resolving<'_> {
     /// Where several sequences would write one name, each gets a folder of its own.
     fn place_in_folders(&mut self) -> Result<(), JobError> {
         let mut owner: HashMap<&Path, usize> = HashMap::new();
-        let clash = self.pictures.iter().any(|p| *owner.entry(&p.picture).or_insert(p.sequence) != p.sequence);
+        let clash =
+            self.pictures.iter().any(|p| *owner.entry(&p.picture).or_insert(p.sequence) != p.sequence);
         if !clash {
             return Ok(());
         }
@@ -247,7 +289,15 @@ mod tests {
     use super::*;
 
     fn layer(step: i64, outside: Outside) -> LayerFile {
-        LayerFile { sequence: PathBuf::new(), name: None, placed: None, start: None, step, outside, materials: None }
+        LayerFile {
+            sequence: PathBuf::new(),
+            name: None,
+            placed: None,
+            start: None,
+            step,
+            outside,
+            materials: None,
+        }
     }
 
     fn shown(given: &LayerFile) -> Vec<Option<usize>> {

@@ -170,7 +170,9 @@ pub fn aovs<'a>(words: impl Iterator<Item = &'a str>) -> Result<AovSet, String> 
     for word in words {
         let aov = Aov::ALL.into_iter().find(|a| a.word() == word);
         let all = || Aov::ALL.map(Aov::word).join(", ");
-        set.insert(aov.ok_or_else(|| format!("there is no auxiliary picture `{word}`; there are {}", all()))?);
+        set.insert(
+            aov.ok_or_else(|| format!("there is no auxiliary picture `{word}`; there are {}", all()))?,
+        );
     }
     Ok(set)
 }
@@ -189,9 +191,12 @@ pub fn up(text: &str) -> Result<DVec3, String> {
 
 /// Three numbers between commas.
 pub fn vector(text: &str) -> Result<DVec3, String> {
-    let numbers: Vec<f64> = text.split(',').map(|s| s.trim().parse()).collect::<Result<_, _>>().unwrap_or_default();
+    let numbers: Vec<f64> =
+        text.split(',').map(|s| s.trim().parse()).collect::<Result<_, _>>().unwrap_or_default();
     match numbers.as_slice() {
-        &[x, y, z] if [x, y, z].iter().all(|x| limits::within(*x, &limits::NUMBER).is_ok()) => Ok(DVec3::new(x, y, z)),
+        &[x, y, z] if [x, y, z].iter().all(|x| limits::within(*x, &limits::NUMBER).is_ok()) => {
+            Ok(DVec3::new(x, y, z))
+        }
         _ => Err(format!("`{text}` is not three numbers, as 0,1,5")),
     }
 }
@@ -211,7 +216,8 @@ pub fn color(text: &str) -> Result<Vec3, String> {
 
 /// A light as typed: `point:x,y,z[,intensity]`.
 pub fn light(text: &str) -> Result<Light, String> {
-    let wrong = || format!("`{text}` is not a light, as point:0,5,2 or point:0,5,2,0.8 (other lights: job file)");
+    let wrong =
+        || format!("`{text}` is not a light, as point:0,5,2 or point:0,5,2,0.8 (other lights: job file)");
     let numbers = text.strip_prefix("point:").ok_or_else(wrong)?;
     let (position, intensity) = match numbers.match_indices(',').nth(2) {
         Some((i, _)) => (&numbers[..i], numbers[i + 1..].trim().parse::<f64>().map_err(|_| wrong())?),
@@ -235,14 +241,19 @@ mod tests {
         let s = Settings::new(&Options::default()).unwrap();
         assert_eq!((s.size, s.samples, s.depth, s.fov_deg), ([1280, 720], 1, 10, 40.0));
         assert_eq!((s.ambient, s.background), (Vec3::splat(0.1), Vec3::ZERO));
-        assert_eq!((s.prune, s.format.as_str(), s.camera, s.lights), (1.0 / 4096.0, "png", CameraChoice::Auto, LightChoice::Auto));
+        assert_eq!(
+            (s.prune, s.format.as_str(), s.camera, s.lights),
+            (1.0 / 4096.0, "png", CameraChoice::Auto, LightChoice::Auto)
+        );
     }
 
     #[test]
     fn a_camera_from_the_command_line_is_laid_over_that_of_the_job() {
         let pose = CameraPose { eye: DVec3::X, look_at: DVec3::ZERO, up: None, fov_deg: Some(30.0) };
-        let track = CameraTrack { keys: vec![Key { frame: 0.0, value: pose }], interpolation: Interpolation::Linear };
-        let o = Options { camera: Some(CameraChoice::Given(track)), eye: Some(DVec3::Y), ..Options::default() };
+        let track =
+            CameraTrack { keys: vec![Key { frame: 0.0, value: pose }], interpolation: Interpolation::Linear };
+        let o =
+            Options { camera: Some(CameraChoice::Given(track)), eye: Some(DVec3::Y), ..Options::default() };
         let camera = Settings::new(&o).unwrap().camera_at(Some(3)).unwrap();
         assert_eq!((camera.eye, camera.look_at, camera.fov_deg), (DVec3::Y, DVec3::ZERO, 30.0));
         let alone = Options { eye: Some(DVec3::Y), ..Options::default() };

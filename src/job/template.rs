@@ -15,7 +15,10 @@ pub(super) fn fill(template: &str, with: Fill<'_>) -> Result<String, String> {
     while let Some(open) = rest.find('{') {
         out.push_str(&rest[..open]);
         let close = rest[open..].find('}').ok_or_else(|| format!("name `{template}`: a {{ is not closed"))?;
-        out.push_str(&placeholder(&rest[open + 1..open + close], with).map_err(|e| format!("name `{template}`: {e}"))?);
+        out.push_str(
+            &placeholder(&rest[open + 1..open + close], with)
+                .map_err(|e| format!("name `{template}`: {e}"))?,
+        );
         rest = &rest[open + close + 1..];
     }
     out.push_str(rest);
@@ -36,7 +39,10 @@ fn placeholder(word: &str, with: Fill<'_>) -> Result<String, String> {
     match word {
         "stem" => Ok(with.stem.to_string()),
         "name" => Ok(with.name.to_string()),
-        "frame" => with.frame.map(|f| number(f, width)).ok_or_else(|| format!("{} has no frame number; use {{stem}}", with.stem)),
+        "frame" => with
+            .frame
+            .map(|f| number(f, width))
+            .ok_or_else(|| format!("{} has no frame number; use {{stem}}", with.stem)),
         _ => Err(format!("there is no {{{word}}}; there are {{stem}}, {{name}}, {{frame}}, {{frame:04}}")),
     }
 }

@@ -126,7 +126,9 @@ impl Transform {
     /// World from object.
     pub fn matrix(&self) -> DAffine3 {
         let [x, y, z] = self.rotate_deg.to_array().map(f64::to_radians);
-        let turn = DMat3::from_quat(DQuat::from_rotation_z(z) * DQuat::from_rotation_y(y) * DQuat::from_rotation_x(x));
+        let turn = DMat3::from_quat(
+            DQuat::from_rotation_z(z) * DQuat::from_rotation_y(y) * DQuat::from_rotation_x(x),
+        );
         DAffine3 { matrix3: turn * DMat3::from_diagonal(self.scale), translation: self.translate }
     }
 }
@@ -172,8 +174,12 @@ mod tests {
 
     #[test]
     fn keys_are_mixed_between_and_held_outside() {
-        let pose = |x: f64, fov| CameraPose { eye: DVec3::X * x, look_at: DVec3::ZERO, up: None, fov_deg: fov };
-        let keys = vec![Key { frame: 1.0, value: pose(0.0, Some(20.0)) }, Key { frame: 5.0, value: pose(8.0, Some(40.0)) }];
+        let pose =
+            |x: f64, fov| CameraPose { eye: DVec3::X * x, look_at: DVec3::ZERO, up: None, fov_deg: fov };
+        let keys = vec![
+            Key { frame: 1.0, value: pose(0.0, Some(20.0)) },
+            Key { frame: 5.0, value: pose(8.0, Some(40.0)) },
+        ];
         let linear = CameraTrack { keys: keys.clone(), interpolation: Interpolation::Linear };
         let eye = |t: &CameraTrack, f: f64| t.at(f, DVec3::Y, 40.0).unwrap().eye.x;
         assert_eq!([-3.0, 1.0, 2.0, 5.0, 9.0].map(|f| eye(&linear, f)), [0.0, 0.0, 2.0, 8.0, 8.0]);

@@ -22,7 +22,9 @@ pub(super) fn nothing_is_lost(job: &Job, records: &Records, options: &RunOptions
     if there.is_empty() {
         return Ok(());
     }
-    if !options.overwrite && let Some(foreign) = there.iter().find(|p| !records.names(p)) {
+    if !options.overwrite
+        && let Some(foreign) = there.iter().find(|p| !records.names(p))
+    {
         return Err(RunError::Foreign(job.folder.join(foreign)));
     }
     let inputs = input_files(job);
@@ -59,7 +61,8 @@ pub(super) fn pictures_gone(job: &Job, report: &mut Report) -> Vec<FrameReport> 
         let path = job.folder.join(&job.pictures[frame.index].picture);
         if !path.is_file() {
             frame.status = Status::Failed;
-            frame.error = Some(format!("{}: was written and is gone; render the frame again", path.display()));
+            frame.error =
+                Some(format!("{}: was written and is gone; render the frame again", path.display()));
             gone.push(frame.clone());
         }
     }

@@ -12,8 +12,6 @@ mod source;
 mod trace;
 mod write;
 
-#[cfg(test)]
-mod tests;
 
 pub use event::{Event, FrameReport, Status};
 pub use read::read_frame;
@@ -28,9 +26,9 @@ use crate::warning::Warnings;
 use read::ReadFrame;
 use slots::Slots;
 use std::path::PathBuf;
-use std::sync::{Arc, Mutex};
 use std::sync::atomic::AtomicUsize;
 use std::sync::mpsc::{channel, sync_channel};
+use std::sync::{Arc, Mutex};
 
 /// Frames read ahead of the device, those being read included.
 const FRAMES_READ_AHEAD: usize = 3;
@@ -39,6 +37,7 @@ const STAGE_THREADS_MAX: usize = 2;
 
 /// What of the command line bears on the run itself.
 #[derive(Clone, Debug, Default)]
+#[allow(clippy::struct_excessive_bools, reason = "each is a switch that a user types")]
 pub struct RunOptions {
     /// Threads of reading and of encoding; the device has its own.
     pub threads: usize,
@@ -182,8 +181,12 @@ pub fn render(
 
 /// What a caught panic says, for the error of its frame.
 fn panic_text(stage: &str, panic: &(dyn std::any::Any + Send)) -> String {
-    let text = panic.downcast_ref::<String>().map(String::as_str).or_else(|| panic.downcast_ref::<&str>().copied());
-    format!("internal error while {stage}: {}; the other frames go on, please report this", text.unwrap_or("no text"))
+    let text =
+        panic.downcast_ref::<String>().map(String::as_str).or_else(|| panic.downcast_ref::<&str>().copied());
+    format!(
+        "internal error while {stage}: {}; the other frames go on, please report this",
+        text.unwrap_or("no text")
+    )
 }
 
 /// Clears up after dead runs. What cannot be cleared up does no harm.

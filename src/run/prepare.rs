@@ -34,7 +34,8 @@ pub(super) fn prepare(job: &Job, options: &RunOptions) -> Prepared {
     for (i, sequence) in job.sequences.iter().enumerate() {
         let pictures = || job.pictures.iter().filter(|p| p.sequence == i);
         let auto_light = pictures().any(|p| p.settings.lights == LightChoice::Auto);
-        let auto_camera = pictures().chain([&sequence.first]).any(|p| p.settings.camera_at(p.frame).is_none());
+        let auto_camera =
+            pictures().chain([&sequence.first]).any(|p| p.settings.camera_at(p.frame).is_none());
         if pictures().next().is_none() {
             continue;
         }
@@ -62,14 +63,18 @@ impl Prepared {
 
     fn camera(&self, picture: &Picture) -> Camera {
         let bounds = || self.sequences[picture.sequence].bounds.unwrap_or(Bounds::EMPTY);
-        picture.settings.camera_at(picture.frame).unwrap_or_else(|| auto::camera(&bounds(), &picture.settings))
+        picture
+            .settings
+            .camera_at(picture.frame)
+            .unwrap_or_else(|| auto::camera(&bounds(), &picture.settings))
     }
 }
 
 /// The box of a sequence's layers over the frames that are looked at; files are scanned on all cores. What cannot be
 /// read is left out and said.
 fn bounds(sequence: &Sequence, warnings: &mut Warnings) -> Bounds {
-    let files: Vec<_> = sequence.layers.iter().flat_map(|l| auto::scanned(l).map(move |i| (l, &l.files[i]))).collect();
+    let files: Vec<_> =
+        sequence.layers.iter().flat_map(|l| auto::scanned(l).map(move |i| (l, &l.files[i]))).collect();
     let boxes: Vec<_> =
         files.par_iter().map(|(layer, file)| (*layer, file, format::scan_bounds(&file.path))).collect();
     let mut all = Bounds::EMPTY;

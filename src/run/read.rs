@@ -8,8 +8,8 @@ use super::{Note, RunOptions, panic_text};
 use crate::device::Stop;
 use crate::diff::Change;
 use crate::format::{Loaded, ReadOptions};
-use crate::kernel;
 use crate::job::{Job, Picture, Settings};
+use crate::kernel;
 use crate::output::{Bits, Encoding, Format, Records};
 use crate::scene::{Frame, Object, PartHash, PartHasher, Shot};
 use crate::warning::Warnings;
@@ -59,9 +59,8 @@ pub(super) fn read_stage(
             return;
         }
         let mut warnings = Warnings::default();
-        let read = catch_unwind(AssertUnwindSafe(|| reader.read(index, &mut warnings))).unwrap_or_else(|panic| {
-            Err(reader.failed(index, panic_text("reading", &*panic)))
-        });
+        let read = catch_unwind(AssertUnwindSafe(|| reader.read(index, &mut warnings)))
+            .unwrap_or_else(|panic| Err(reader.failed(index, &panic_text("reading", &*panic))));
         if !warnings.is_empty() {
             let _ = note.send(Note::Warnings(warnings));
         }
@@ -72,7 +71,12 @@ pub(super) fn read_stage(
 }
 
 impl<'a> Reader<'a> {
-    pub(super) fn new(job: &'a Job, options: &'a RunOptions, records: &'a Records, prepared: Prepared) -> Self {
+    pub(super) fn new(
+        job: &'a Job,
+        options: &'a RunOptions,
+        records: &'a Records,
+        prepared: Prepared,
+    ) -> Self {
         Self { job, options, records, prepared }
     }
 
@@ -81,7 +85,8 @@ impl<'a> Reader<'a> {
         let picture = &self.job.pictures[index];
         let mut report = self.blank(index);
         let sources = &self.prepared.sources;
-        let loaded = load_frame(self.job, picture, sources, self.options.lenient, self.options.strict, warnings);
+        let loaded =
+            load_frame(self.job, picture, sources, self.options.lenient, self.options.strict, warnings);
         let frame = match loaded {
             Ok(loaded) => {
                 report.bytes.read = loaded.bytes_read;
@@ -137,7 +142,7 @@ impl<'a> Reader<'a> {
         })
     }
 
-    fn failed(&self, index: usize, error: String) -> Box<FrameReport> {
+    fn failed(&self, index: usize, error: &str) -> Box<FrameReport> {
         let mut report = self.blank(index);
         report.error = Some(format!("{}: {error}", report.source));
         report
@@ -179,13 +184,20 @@ fn load_frame(
         if strict && let Some(missing) = loaded.missing.first() {
             return Err(format!("{missing}; the frame is not rendered (--strict)"));
         }
-        all.frame.objects.push(Object { geometry: Arc::clone(&loaded.geometry), transform: source.transform });
+        all.frame
+            .objects
+            .push(Object { geometry: Arc::clone(&loaded.geometry), transform: source.transform });
     }
     Ok(all)
 }
 
 /// Reads the frame of a picture, without the run around it.
-pub fn read_frame(job: &Job, picture: &Picture, lenient: bool, warnings: &mut Warnings) -> Result<Frame, String> {
+pub fn read_frame(
+    job: &Job,
+    picture: &Picture,
+    lenient: bool,
+    warnings: &mut Warnings,
+) -> Result<Frame, String> {
     load_frame(job, picture, &Sources::default(), lenient, false, warnings).map(|l| l.frame)
 }
 
@@ -194,7 +206,11 @@ fn warn_of_materials(path: &Path, loaded: &Loaded, warnings: &mut Warnings) {
     let g = &loaded.geometry;
     for m in &g.materials {
         if let Some(other) = kernel::fallback(m.illum) {
-            warnings.add(None, None, format!("illum {} is rendered as illum {other} by this version", m.illum));
+            warnings.add(
+                None,
+                None,
+                format!("illum {} is rendered as illum {other} by this version", m.illum),
+            );
         }
         if !m.maps.is_empty() {
             warnings.add(None, None, "textures are not rendered by this version; the constants are used");
@@ -203,7 +219,11 @@ fn warn_of_materials(path: &Path, loaded: &Loaded, warnings: &mut Warnings) {
     let has_faces = !g.triangles.0.is_empty();
     let is_seen = |run: &[u32; 2]| g.materials.get(run[1] as usize).is_none_or(|m| m.d > 0.0);
     if has_faces && !g.material_runs.0.iter().any(is_seen) {
-        warnings.add(Some(path), None, "every face is wholly transparent (d 0); some exporters write that by mistake");
+        warnings.add(
+            Some(path),
+            None,
+            "every face is wholly transparent (d 0); some exporters write that by mistake",
+        );
     }
 }
 

@@ -3,7 +3,7 @@
 use super::event::{FrameReport, Status};
 use super::machine::{Machine, machine, peak_rss_bytes};
 use crate::clock::Stopwatch;
-use crate::device::{DeviceInfo, Device};
+use crate::device::{Device, DeviceInfo};
 use crate::output::{self, OutputError};
 use serde::Serialize;
 use std::path::PathBuf;
@@ -166,7 +166,12 @@ impl Saver {
     }
 
     /// Saves if it is time to; at the end always. What cannot be written becomes a warning of the report at the end.
-    pub(super) fn save(&mut self, report: &mut Report, since: &Stopwatch, at_end: bool) -> Result<(), OutputError> {
+    pub(super) fn save(
+        &mut self,
+        report: &mut Report,
+        since: &Stopwatch,
+        at_end: bool,
+    ) -> Result<(), OutputError> {
         let Some(path) = &self.path else { return Ok(()) };
         let now_s = since.s();
         if !at_end && now_s - self.saved_s < SAVE_EVERY_S.max(self.cost_s / SAVE_SHARE_MAX) {

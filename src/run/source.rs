@@ -32,11 +32,22 @@ impl Sources {
 
     /// Loads an OBJ for a picture, or gives what is kept of it if the file's size and time are the same. `still`
     /// keeps it for the other pictures. The flag tells whether this picture is the first to use it.
-    pub(super) fn load(&self, path: &Path, options: &ReadOptions, still: bool) -> Result<(Arc<Loaded>, bool), FormatError> {
+    pub(super) fn load(
+        &self,
+        path: &Path,
+        options: &ReadOptions,
+        still: bool,
+    ) -> Result<(Arc<Loaded>, bool), FormatError> {
         self.get(path, options, still, true)
     }
 
-    fn get(&self, path: &Path, options: &ReadOptions, keep: bool, uses: bool) -> Result<(Arc<Loaded>, bool), FormatError> {
+    fn get(
+        &self,
+        path: &Path,
+        options: &ReadOptions,
+        keep: bool,
+        uses: bool,
+    ) -> Result<(Arc<Loaded>, bool), FormatError> {
         let stamp = std::fs::metadata(path).map(|m| (m.len(), m.modified().ok())).unwrap_or_default();
         {
             let mut kept = self.kept.lock().unwrap_or_else(PoisonError::into_inner);

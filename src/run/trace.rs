@@ -108,11 +108,7 @@ impl DeviceStage<'_> {
         }
     }
 
-    fn update_and_trace(
-        &mut self,
-        read: &mut ReadFrame,
-        stop: &Stop,
-    ) -> Result<Film, DeviceError> {
+    fn update_and_trace(&mut self, read: &mut ReadFrame, stop: &Stop) -> Result<Film, DeviceError> {
         let report = &mut read.report;
         let clock = Stopwatch::start();
         let cold = self.cold || self.forget;

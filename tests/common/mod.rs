@@ -1,5 +1,5 @@
 //! What the tests through the binary share: running it, made sequences, pictures by their bytes.
-#![allow(dead_code, reason = "each test file uses its own share")]
+#![allow(dead_code, unreachable_pub, reason = "each test file uses its own share")]
 
 use std::collections::BTreeMap;
 use std::ffi::OsStr;

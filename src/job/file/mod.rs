@@ -64,7 +64,11 @@ pub(super) fn read(path: &Path) -> Result<JobFile, JobError> {
     let unreadable = |source| JobError::Unreadable { path: path.to_path_buf(), source };
     let length = std::fs::metadata(path).map_err(unreadable)?.len();
     if length > MAX_BYTES {
-        return Err(JobError::File { path: path.to_path_buf(), place: String::new(), text: format!("has {length} bytes, more than the {MAX_BYTES} of any job file") });
+        return Err(JobError::File {
+            path: path.to_path_buf(),
+            place: String::new(),
+            text: format!("has {length} bytes, more than the {MAX_BYTES} of any job file"),
+        });
     }
     let text = std::fs::read_to_string(path).map_err(unreadable)?;
     let folder = path.parent().unwrap_or(Path::new(""));
@@ -90,7 +94,11 @@ fn parse(text: &str, folder: &Path) -> Result<JobFile, (String, String)> {
 
 /// The first or last line that begins with a key, as `:3:1`.
 fn line_of(text: &str, key: &str, last: bool) -> String {
-    let begins = |l: &&str| l.trim_start_matches([' ', '-', '{']).strip_prefix(key).is_some_and(|r| r.trim_start().starts_with(':'));
+    let begins = |l: &&str| {
+        l.trim_start_matches([' ', '-', '{'])
+            .strip_prefix(key)
+            .is_some_and(|r| r.trim_start().starts_with(':'))
+    };
     let mut lines = text.lines().zip(1..).filter(|(l, _)| begins(l)).map(|(_, n)| n);
     let line: Option<u32> = if last { lines.last() } else { lines.next() };
     line.map(|l| format!(":{l}:1")).unwrap_or_default()
@@ -99,7 +107,8 @@ fn line_of(text: &str, key: &str, last: bool) -> String {
 /// serde's text without the place, which stands in front, and with the nearest known name.
 fn plainly(text: &str) -> String {
     let text = text.split(" at line ").next().unwrap_or(text);
-    let Some(rest) = text.split("unknown field `").nth(1).or_else(|| text.split("unknown variant `").nth(1)) else {
+    let Some(rest) = text.split("unknown field `").nth(1).or_else(|| text.split("unknown variant `").nth(1))
+    else {
         return text.to_string();
     };
     let mut words = rest.split('`');
@@ -195,7 +204,6 @@ fn convert(job: schema::Job, folder: &Path) -> Result<JobFile, Wrong> {
     Ok(file)
 }
 
-
 fn camera(choice: Choice<schema::Camera>) -> Result<CameraChoice, Wrong> {
     let Choice::Given(c) = choice else { return Ok(CameraChoice::Auto) };
     let wrong = |text: &str| Err(("camera", text.to_string()));
@@ -216,7 +224,12 @@ fn camera(choice: Choice<schema::Camera>) -> Result<CameraChoice, Wrong> {
             })
             .collect(),
         (None, Some(eye), Some(look_at)) => {
-            let value = CameraPose { eye: eye.0, look_at: look_at.0, up: c.up.map(|u| u.0), fov_deg: c.fov.map(|f| f.0) };
+            let value = CameraPose {
+                eye: eye.0,
+                look_at: look_at.0,
+                up: c.up.map(|u| u.0),
+                fov_deg: c.fov.map(|f| f.0),
+            };
             vec![Key { frame: 0.0, value }]
         }
         (Some(_), ..) => return wrong("a camera with keys has eye and look_at in the keys"),
@@ -270,7 +283,10 @@ fn light(l: schema::Light) -> Result<Light, Wrong> {
         }),
         (None, None, Some(s), None) => {
             if s.inner.0 > s.outer.0 || s.outer.0 > 90.0 {
-                return Err(("lights", format!("a spot needs inner ≤ outer ≤ 90, not {} and {}", s.inner.0, s.outer.0)));
+                return Err((
+                    "lights",
+                    format!("a spot needs inner ≤ outer ≤ 90, not {} and {}", s.inner.0, s.outer.0),
+                ));
             }
             Ok(Light::Spot {
                 position: s.position.f32(),
@@ -282,7 +298,9 @@ fn light(l: schema::Light) -> Result<Light, Wrong> {
                 falloff: falloff(s.falloff),
             })
         }
-        (None, None, None, Some(_)) => Err(("lights", "area lights are not supported by this version".to_string())),
+        (None, None, None, Some(_)) => {
+            Err(("lights", "area lights are not supported by this version".to_string()))
+        }
         _ => Err(("lights", "each light is one of point, directional, spot, area".to_string())),
     }
 }
@@ -302,10 +320,17 @@ fn materials(
 }
 
 fn convert_layer(layer: schema::Layer, folder: &Path) -> Result<LayerFile, Wrong> {
-    let frames = layer.frames.unwrap_or(schema::LayerFrames { start: None, step: None, outside: schema::Outside::Hold });
+    let frames = layer.frames.unwrap_or(schema::LayerFrames {
+        start: None,
+        step: None,
+        outside: schema::Outside::Hold,
+    });
     let step = frames.step.map_or(1, |s| s.0 as i64);
     if step == 0 {
-        return Err(("frames", "a step of 0 never leaves the first frame; leave step out or give another".to_string()));
+        return Err((
+            "frames",
+            "a step of 0 never leaves the first frame; leave step out or give another".to_string(),
+        ));
     }
     Ok(LayerFile {
         sequence: folder.join(layer.sequence.0),
@@ -323,16 +348,28 @@ fn convert_layer(layer: schema::Layer, folder: &Path) -> Result<LayerFile, Wrong
 }
 
 fn placed(t: schema::Transform) -> Result<Placed, Wrong> {
-    let transform = |translate: Option<value::Triple<value::Any>>, rotate: Option<value::Triple<value::Any>>, scale: Option<value::Triple<value::Any>>| {
+    let transform = |translate: Option<value::Triple<value::Any>>,
+                     rotate: Option<value::Triple<value::Any>>,
+                     scale: Option<value::Triple<value::Any>>| {
         let part = |v: Option<value::Triple<value::Any>>, absent: DVec3| v.map_or(absent, |v| v.0);
-        Transform { translate: part(translate, DVec3::ZERO), rotate_deg: part(rotate, DVec3::ZERO), scale: part(scale, DVec3::ONE) }
+        Transform {
+            translate: part(translate, DVec3::ZERO),
+            rotate_deg: part(rotate, DVec3::ZERO),
+            scale: part(scale, DVec3::ONE),
+        }
     };
     let keys = match t.keys {
         None => vec![Key { frame: 0.0, value: transform(t.translate, t.rotate, t.scale) }],
         Some(_) if t.translate.is_some() || t.rotate.is_some() || t.scale.is_some() => {
-            return Err(("transform", "a transform with keys has translate, rotate and scale in the keys".to_string()));
+            return Err((
+                "transform",
+                "a transform with keys has translate, rotate and scale in the keys".to_string(),
+            ));
         }
-        Some(keys) => keys.into_iter().map(|k| Key { frame: k.frame.0, value: transform(k.translate, k.rotate, k.scale) }).collect(),
+        Some(keys) => keys
+            .into_iter()
+            .map(|k| Key { frame: k.frame.0, value: transform(k.translate, k.rotate, k.scale) })
+            .collect(),
     };
     Ok(Placed { keys: ordered(keys, "transform")? })
 }

@@ -90,7 +90,10 @@ impl<'de, R: Range> Deserialize<'de> for Triple<R> {
             fn visit_seq<A: SeqAccess<'de>>(self, mut list: A) -> Result<DVec3, A::Error> {
                 let mut v = [0.0; 3];
                 for (i, x) in v.iter_mut().enumerate() {
-                    *x = list.next_element::<Number<R>>()?.ok_or_else(|| de::Error::invalid_length(i, &self))?.0;
+                    *x = list
+                        .next_element::<Number<R>>()?
+                        .ok_or_else(|| de::Error::invalid_length(i, &self))?
+                        .0;
                 }
                 match list.next_element::<de::IgnoredAny>()? {
                     Some(_) => Err(de::Error::invalid_length(4, &self)),
