@@ -29,7 +29,10 @@ fn main() {
         .map(|file| scenes.join(file))
         .to_vec();
     }
-    println!("{:>34} {:>8} {:>9} {:>9} {:>9} {:>7} {:>7}", "file", "MB", "tobj ms", "load ms", "bounds ms", "load", "bounds");
+    println!(
+        "{:>34} {:>8} {:>9} {:>9} {:>9} {:>7} {:>7}",
+        "file", "MB", "tobj ms", "load ms", "bounds ms", "load", "bounds"
+    );
     for file in files.iter().filter(|file| file.is_file()) {
         measure(file);
     }

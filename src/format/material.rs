@@ -3,7 +3,7 @@
 
 use super::error::FormatError;
 use super::lookup::Lookup;
-use super::mtl::{self, Given, Skipped};
+use super::mtl::{self, Given};
 use super::text::{self, Text, is_blank, shown};
 use super::{MaterialOverride, ReadOptions};
 use crate::scene::{MapFile, Material, Part, PartHash, PartHasher};
@@ -134,19 +134,16 @@ impl<'a> Loader<'a> {
         let text = Text::new(&bytes, path)?;
         let parsed = mtl::parse(&text);
         self.note_input(path, bytes.len());
-        let mut warn = |skipped: &Skipped, what: &str| {
+        for (skipped, what) in [
+            (&parsed.unknown, "unknown statements are skipped"),
+            (&parsed.malformed, "statements with a malformed value are skipped"),
+        ] {
             if skipped.tally.count > 0 {
-                let text_of = format!("{what}, the first is `{}`", shown(&skipped.word));
-                warnings.add_times(
-                    Some(path),
-                    Some(text.line_at(skipped.tally.first)),
-                    text_of,
-                    skipped.tally.count,
-                );
+                let line = text.line_at(skipped.tally.first);
+                let what = format!("{what}, the first is `{}`", shown(&skipped.word));
+                warnings.add_times(Some(path), Some(line), what, skipped.tally.count);
             }
-        };
-        warn(&parsed.unknown, "unknown statements are skipped");
-        warn(&parsed.malformed, "statements with a malformed value are skipped");
+        }
         let entry = |given| Entry { given, file: Some(path.to_path_buf()) };
         Ok(parsed.materials.into_iter().map(|(name, given)| (name, entry(given))).collect())
     }
@@ -185,16 +182,13 @@ impl<'a> Loader<'a> {
         if let Some(&known) = self.contents.get(path) {
             return known;
         }
-        let bytes = text::read(path).ok();
-        let content = bytes.as_deref().map(|bytes| {
+        let content = text::read(path).ok().map(|bytes| {
+            self.note_input(path, bytes.len());
             let mut hasher = PartHasher::new("file");
-            hasher.bytes(bytes);
+            hasher.bytes(&bytes);
             hasher.finish()
         });
         self.contents.insert(path.to_path_buf(), content);
-        if let Some(bytes) = bytes {
-            self.note_input(path, bytes.len());
-        }
         content
     }
 }

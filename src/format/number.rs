@@ -11,6 +11,9 @@ const POWERS: [f64; 23] = [
 /// The same as integers, as far as eight digits go.
 const INTEGER_POWERS: [u64; 9] = [1, 10, 100, 1_000, 10_000, 100_000, 1_000_000, 10_000_000, 100_000_000];
 
+/// The nearest f64 to their inverses, as far.
+const INVERSE_POWERS: [f64; 9] = [1e0, 1e-1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8];
+
 /// Digits that surely fit a `u64`.
 const MAX_DIGITS: usize = 18;
 
@@ -20,23 +23,35 @@ pub(super) fn byte(text: &[u8], at: usize) -> u8 {
     text.get(at).copied().unwrap_or(b'\n')
 }
 
+/// The high bit of each byte that is no digit, and nothing else.
+#[inline]
+fn others(bytes: u64) -> u64 {
+    // a digit becomes 0 to 9; adding 0x76 lifts everything else below 0x80, and only that, to 0x80
+    let ones = bytes ^ 0x3030_3030_3030_3030;
+    ((ones & 0x7F7F_7F7F_7F7F_7F7F) + 0x7676_7676_7676_7676 | ones) & 0x8080_8080_8080_8080
+}
+
+/// The value of the first `count` bytes, at most eight, all digits.
+#[inline]
+fn value(bytes: u64, count: usize) -> u64 {
+    // what lies behind is shifted out (in two steps: a shift by 64 is none), then come pairs, fours and all eight
+    let half = 32 - 4 * count;
+    let ones = (bytes ^ 0x3030_3030_3030_3030) << half << half;
+    let pairs = ones.wrapping_mul(10).wrapping_add(ones >> 8);
+    let low = (pairs & 0x0000_00FF_0000_00FF).wrapping_mul(0x000F_4240_0000_0064);
+    let high = (pairs >> 16 & 0x0000_00FF_0000_00FF).wrapping_mul(0x0000_2710_0000_0001);
+    low.wrapping_add(high) >> 32
+}
+
 /// Up to eight digits from `at`: their value and how many they are.
 #[inline]
 pub(super) fn digits(text: &[u8], at: usize) -> (u64, usize) {
     let Some(chunk) = text.get(at..).and_then(<[u8]>::first_chunk::<8>) else {
         return last_digits(text, at);
     };
-    // Each digit becomes 0 to 9, every other byte 10 or more; adding 0x76 lifts those, and only those, to 0x80.
-    let bytes = u64::from_le_bytes(*chunk) ^ 0x3030_3030_3030_3030;
-    let others = (bytes.wrapping_add(0x7676_7676_7676_7676) | bytes) & 0x8080_8080_8080_8080;
-    let count = (others.trailing_zeros() / 8) as usize;
-    // Leading zeros for what is not a digit (in two steps: a shift by 64 is none), then pairs, fours, eights.
-    let half = 32 - 4 * count;
-    let ones = bytes << half << half;
-    let pairs = ones.wrapping_mul(10).wrapping_add(ones >> 8);
-    let fours_low = (pairs & 0x0000_00FF_0000_00FF).wrapping_mul(0x000F_4240_0000_0064);
-    let fours_high = (pairs >> 16 & 0x0000_00FF_0000_00FF).wrapping_mul(0x0000_2710_0000_0001);
-    (fours_low.wrapping_add(fours_high) >> 32, count)
+    let bytes = u64::from_le_bytes(*chunk);
+    let count = (others(bytes).trailing_zeros() / 8) as usize;
+    (value(bytes, count), count)
 }
 
 /// [`digits`] within eight bytes of the end of the text.
@@ -49,8 +64,47 @@ fn last_digits(text: &[u8], at: usize) -> (u64, usize) {
 
 /// The number at `at` and the place behind it; None where it is malformed. The place is then that of the next
 /// blank, comment or line end.
-#[inline]
+#[inline(always)]
 pub(super) fn float(text: &[u8], at: usize) -> (Option<f32>, usize) {
+    match short_decimal(text, at) {
+        Some((value, end)) => (Some(value), end),
+        None => long_float(text, at),
+    }
+}
+
+/// A sign, up to six digits, a point, and up to eight digits, the way nearly all numbers are written: both places
+/// where something else than a digit stands are found at once, and the next number need not wait for the value.
+#[inline(always)]
+fn short_decimal(text: &[u8], start: usize) -> Option<(f32, usize)> {
+    let window = text.get(start..)?.first_chunk::<24>()?;
+    let eight = |at: usize| window.get(at..)?.first_chunk().map(|chunk| u64::from_le_bytes(*chunk));
+    let (low, high) = (eight(0)?, eight(8)?);
+    let signed = usize::from(matches!(window[0], b'-' | b'+'));
+    let in_low = others(low) & !(0x80 * signed as u64);
+    let second = in_low & in_low.wrapping_sub(1);
+    let in_high = others(high).trailing_zeros() + 64;
+    let end = (if second == 0 { in_high } else { second.trailing_zeros() } / 8) as usize;
+    let point = (in_low.trailing_zeros() / 8) as usize;
+    let decimals = end.wrapping_sub(point + 1);
+    let sound = window[point] == b'.' && decimals <= 8 && end - signed > 1 && ends_number(window[end]);
+    if point == 8 || !sound {
+        return None;
+    }
+    let whole = value(low >> (8 * signed), point - signed);
+    let mantissa = whole * INTEGER_POWERS[decimals] + value(eight(point + 1)?, decimals);
+    // fifteen digits are exact; the product is the quotient but for 2 units in the last place, which is as good as
+    // exact unless halfway between two f32 is as near
+    let value = mantissa as i64 as f64 * INVERSE_POWERS[decimals];
+    if (value.to_bits() & 0x1FFF_FFFF).abs_diff(0x1000_0000) <= 4 {
+        return None;
+    }
+    let sign = u32::from(window[0] == b'-') << 31;
+    Some((f32::from_bits((value as f32).to_bits() | sign), start + end))
+}
+
+/// All that [`short_decimal`] leaves.
+#[inline(never)]
+fn long_float(text: &[u8], at: usize) -> (Option<f32>, usize) {
     match plain_decimal(text, at) {
         Some((value, end)) => (Some(value), end),
         None => any_float(text, at),
@@ -108,14 +162,17 @@ fn plain_decimal(text: &[u8], start: usize) -> Option<(f32, usize)> {
     Some((if sign == b'-' { -value } else { value }, at))
 }
 
-/// The f32 nearest to the decimal to which `value` is the nearest f64; None where that cannot be told. Rounding
-/// twice errs only where the first step lands halfway between two f32: an f64 whose last 29 bits are 100…0. The
-/// f32 in question must be normal, else those are not the bits that go.
-#[inline]
+/// The f32 nearest to the decimal to which `value` is the nearest f64; None where that cannot be told. The f32 in
+/// question must be normal, else other bits decide.
 fn rounded(value: f64) -> Option<f32> {
-    let halfway = value.to_bits() & 0x1FFF_FFFF == 0x1000_0000;
     let normal = (f64::from(f32::MIN_POSITIVE)..f64::from(f32::MAX)).contains(&value) || value == 0.0;
-    (normal && !halfway).then_some(value as f32)
+    (normal && !is_halfway(value)).then_some(value as f32)
+}
+
+/// Whether an f64 lies halfway between two f32: its last 29 bits are 100…0. Rounding twice errs only there.
+#[inline]
+fn is_halfway(value: f64) -> bool {
+    value.to_bits() & 0x1FFF_FFFF == 0x1000_0000
 }
 
 /// Everything else: many digits, large exponents, `inf`, `nan`, and what is no number.

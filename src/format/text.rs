@@ -2,7 +2,7 @@
 //! for UTF-8.
 
 use super::error::FormatError;
-use memchr::{memchr_iter, memchr2};
+use memchr::memchr_iter;
 use std::borrow::Cow;
 use std::fs;
 use std::path::Path;
@@ -118,7 +118,23 @@ fn join_lines(bytes: &[u8]) -> Cow<'_, [u8]> {
 /// Where the line that holds `from` ends: the place of its line end, or of the end of the text.
 #[inline]
 pub(super) fn line_end(text: &[u8], from: usize) -> usize {
-    memchr2(b'\n', b'\r', &text[from..]).map_or(text.len(), |length| from + length)
+    let mut at = from;
+    // lines are short: eight bytes at a time, without a call
+    while let Some(chunk) = text[at..].first_chunk::<8>() {
+        let bytes = u64::from_le_bytes(*chunk);
+        let found = has_zero(bytes ^ 0x0A0A_0A0A_0A0A_0A0A) | has_zero(bytes ^ 0x0D0D_0D0D_0D0D_0D0D);
+        if found != 0 {
+            return at + (found.trailing_zeros() / 8) as usize;
+        }
+        at += 8;
+    }
+    text[at..].iter().position(|&b| is_line_end(b)).map_or(text.len(), |length| at + length)
+}
+
+/// The high bit of the first byte that is zero, if one is (and maybe bits behind it).
+#[inline]
+fn has_zero(bytes: u64) -> u64 {
+    bytes.wrapping_sub(0x0101_0101_0101_0101) & !bytes & 0x8080_8080_8080_8080
 }
 
 /// A line without its comment: `#` opens one at the start of the line or behind a blank.

@@ -1,6 +1,6 @@
 //! Which faces cannot be rendered, and why. Nothing is looked at twice unless something is wrong.
 
-use super::scan::{FaceList, Scan, face_words, position_offset};
+use super::scan::{FaceList, Scan, face_offset, face_words, position_offset};
 use crate::format::error::FormatError;
 use crate::format::text::{Text, shown};
 use crate::scene::ABSENT;
@@ -31,8 +31,8 @@ pub(super) fn check_faces(
         }
     }
     let Some(&first) = bad.first() else { return Ok(()) };
-    let offset = scan.faces.offsets[first as usize] as usize;
-    let cause = cause(scan, text, first);
+    let offset = face_offset(&text.joined, first).unwrap_or(0);
+    let cause = cause(scan, text, first, offset);
     let line = text.line_at(offset);
     if !lenient {
         return Err(FormatError::BadFace { path: path.to_path_buf(), line, cause });
@@ -44,12 +44,12 @@ pub(super) fn check_faces(
 }
 
 /// What is wrong with a bad face, of its first corner that is.
-fn cause(scan: &Scan, text: &Text, face: u32) -> String {
+fn cause(scan: &Scan, text: &Text, face: u32, offset: usize) -> String {
     let face = face as usize;
     let before: usize = scan.faces.counts[..face].iter().map(|&count| count as usize).sum();
     let vertices = scan.positions.len();
     let corners = &scan.faces.positions[before..before + scan.faces.counts[face] as usize];
-    for (&index, word) in corners.iter().zip(face_words(&text.joined, scan.faces.offsets[face] as usize)) {
+    for (&index, word) in corners.iter().zip(face_words(&text.joined, offset)) {
         let Some(position) = scan.positions.get(index as usize) else {
             return without_position(word, vertices);
         };
@@ -86,17 +86,15 @@ fn drop_faces(scan: &mut Scan, bad: &[u32]) {
     for &face in bad {
         keep[face as usize] = false;
     }
-    let FaceList { counts, offsets, positions, texcoords, normals } = &mut scan.faces;
+    let FaceList { counts, positions, texcoords, normals } = &mut scan.faces;
     for list in [positions, texcoords, normals] {
         let per_corner =
             counts.iter().zip(&keep).flat_map(|(&n, &keep)| std::iter::repeat_n(keep, n as usize));
         let mut of_list = per_corner.chain(std::iter::repeat(true));
         list.retain(|_| of_list.next() == Some(true));
     }
-    for list in [counts, offsets] {
-        let mut of_list = keep.iter();
-        list.retain(|_| of_list.next() == Some(&true));
-    }
+    let mut of_list = keep.iter();
+    counts.retain(|_| of_list.next() == Some(&true));
     let moved = |face: u32| face - bad.partition_point(|&b| b < face) as u32;
     scan.objects.iter_mut().for_each(|face| *face = moved(*face));
     scan.materials.iter_mut().for_each(|(face, _)| *face = moved(*face));

@@ -21,7 +21,7 @@ pub(super) struct Corner {
 
 /// Reads the corner at `at`; the place behind it. `so_far`: how many positions, texture coordinates and normals
 /// stand before it, from which negative indices count.
-#[inline]
+#[inline(always)]
 pub(super) fn corner(text: &[u8], at: usize, so_far: [usize; 3]) -> (Corner, usize) {
     let mut corner = Corner { position: ABSENT, texcoord: ABSENT, normal: ABSENT };
     let mut at = at;
@@ -48,7 +48,7 @@ fn malformed(text: &[u8], mut at: usize) -> (Corner, usize) {
 }
 
 /// One index: [`ABSENT`] where there is no digit.
-#[inline]
+#[inline(always)]
 fn index(text: &[u8], at: usize, so_far: usize) -> (u32, usize) {
     let (value, count) = digits(text, at);
     if count == 0 {
@@ -63,6 +63,7 @@ fn index(text: &[u8], at: usize, so_far: usize) -> (u32, usize) {
 
 /// An index of eight digits or more.
 #[cold]
+#[inline(never)]
 fn long(text: &[u8], mut at: usize) -> (u32, usize) {
     let mut value = 0u64;
     while byte(text, at).is_ascii_digit() {
@@ -73,6 +74,7 @@ fn long(text: &[u8], mut at: usize) -> (u32, usize) {
 }
 
 /// An index with a sign; a negative one counts back from the last so far.
+#[inline(never)]
 fn signed(text: &[u8], at: usize, so_far: usize) -> (u32, usize) {
     let (value, count) = digits(text, at + 1);
     if count == 0 {

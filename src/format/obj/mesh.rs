@@ -66,32 +66,27 @@ pub(super) fn geometry(
     smooth_angle_deg: Option<f32>,
 ) -> Geometry {
     let Scan { positions, mut colors, texcoords, normals, faces, objects, smoothing, .. } = scan;
-    let FaceList { counts, positions: corners, texcoords: texcoord_corners, normals: normal_corners, .. } =
-        faces;
-    let order = Order::new(&positions, &counts, &corners);
-    let triangles = order.gather(&corners);
-    let starts = TriangleStarts::new(&counts);
-    let meshes = meshes(&objects, &starts);
+    let lists = TriangleLists::new(&positions, &faces);
+    let mut starts = TriangleStarts::new(&faces.counts);
     let material_runs = runs.into_iter().map(|(face, slot)| [starts.at(face), slot]).collect();
-    let given = order.gather(&normal_corners);
-    let derived = if given.is_empty() || given.as_flattened().contains(&ABSENT) {
-        derived_normals(&positions, &triangles, smooth_angle_deg, &smoothing, &starts)
+    let meshes = meshes(&objects, &faces.counts);
+    let derived = if lists.normals.is_empty() || lists.normals.as_flattened().contains(&ABSENT) {
+        derived_normals(&positions, &lists.triangles, smooth_angle_deg, &smoothing, &faces.counts)
     } else {
         None
     };
     if !colors.is_empty() {
         colors.resize(positions.len(), [f32::NAN; 3]);
     }
-    let texcoord_corners = order.gather(&texcoord_corners);
     Geometry {
         positions: Part::new(Positions(compact(positions))),
-        faces: Part::new(Faces { counts: compact(counts), corners: compact(corners) }),
-        triangles: Part::new(Triangles(triangles)),
-        texcoords: (!texcoord_corners.is_empty()).then(|| Attribute {
+        faces: Part::new(Faces { counts: compact(faces.counts), corners: compact(faces.positions) }),
+        triangles: Part::new(Triangles(lists.triangles)),
+        texcoords: (!lists.texcoords.is_empty()).then(|| Attribute {
             values: Part::new(Texcoords(compact(texcoords))),
-            corners: Part::new(Corners(texcoord_corners)),
+            corners: Part::new(Corners(lists.texcoords)),
         }),
-        normals: shading_normals(normals, given, derived),
+        normals: shading_normals(normals, lists.normals, derived),
         colors: (!colors.is_empty()).then(|| Part::new(Colors(colors))),
         material_runs: Part::new(MaterialRuns(material_runs)),
         materials,
@@ -105,78 +100,85 @@ fn compact<T>(mut list: Vec<T>) -> Vec<T> {
     list
 }
 
-/// Which corners, counted through the file, make each triangle.
-enum Order {
-    /// Three by three.
-    AsWritten,
-    /// These.
-    Listed(Vec<[u32; 3]>),
+/// The indices of all triangles' corners; those of an attribute are empty where no corner has it.
+struct TriangleLists {
+    triangles: Vec<[u32; 3]>,
+    texcoords: Vec<[u32; 3]>,
+    normals: Vec<[u32; 3]>,
 }
 
-impl Order {
-    fn new(positions: &[[f32; 3]], counts: &[u32], corners: &[u32]) -> Self {
-        if counts.iter().all(|&count| count == 3) {
-            return Self::AsWritten;
+impl TriangleLists {
+    fn new(positions: &[[f32; 3]], faces: &FaceList) -> Self {
+        if faces.counts.iter().all(|&count| count == 3) {
+            let as_written = |list: &[u32]| list.as_chunks().0.to_vec();
+            return Self {
+                triangles: as_written(&faces.positions),
+                texcoords: as_written(&faces.texcoords),
+                normals: as_written(&faces.normals),
+            };
         }
-        let mut listed = Vec::with_capacity(corners.len() - 2 * counts.len());
+        let count = faces.positions.len() - 2 * faces.counts.len();
+        let reserved = |list: &[u32]| Vec::with_capacity(if list.is_empty() { 0 } else { count });
+        let mut lists = Self {
+            triangles: reserved(&faces.positions),
+            texcoords: reserved(&faces.texcoords),
+            normals: reserved(&faces.normals),
+        };
+        let mut of_face = Vec::new();
         let mut first = 0;
-        for &count in counts {
-            let from = listed.len();
-            triangulate(positions, &corners[first..first + count as usize], &mut listed);
-            for triangle in &mut listed[from..] {
-                *triangle = triangle.map(|corner| corner + first as u32);
-            }
-            first += count as usize;
+        for &count in &faces.counts {
+            let corners = first..first + count as usize;
+            of_face.clear();
+            triangulate(positions, &faces.positions[corners.clone()], &mut of_face);
+            let append = |list: &mut Vec<[u32; 3]>, indices: &[u32]| {
+                if let Some(indices) = indices.get(corners.clone()) {
+                    list.extend(
+                        of_face.iter().map(|triangle| triangle.map(|corner| indices[corner as usize])),
+                    );
+                }
+            };
+            append(&mut lists.triangles, &faces.positions);
+            append(&mut lists.texcoords, &faces.texcoords);
+            append(&mut lists.normals, &faces.normals);
+            first = corners.end;
         }
-        Self::Listed(listed)
-    }
-
-    /// Of a list with one entry a corner those of the triangles; nothing of an empty list.
-    fn gather(&self, list: &[u32]) -> Vec<[u32; 3]> {
-        match self {
-            _ if list.is_empty() => Vec::new(),
-            Self::AsWritten => list.as_chunks::<3>().0.to_vec(),
-            Self::Listed(order) => order.iter().map(|t| t.map(|corner| list[corner as usize])).collect(),
-        }
+        lists
     }
 }
 
-/// The first triangle of each face, and of one behind the last.
-struct TriangleStarts(Vec<u32>);
+/// Tells the first triangle of faces asked for in ascending order.
+struct TriangleStarts<'a> {
+    counts: &'a [u32],
+    face: usize,
+    triangle: u32,
+}
 
-impl TriangleStarts {
-    fn new(counts: &[u32]) -> Self {
-        let mut starts = Vec::with_capacity(counts.len() + 1);
-        let mut next = 0;
-        for &count in counts {
-            starts.push(next);
-            next += count - 2;
-        }
-        starts.push(next);
-        Self(starts)
+impl<'a> TriangleStarts<'a> {
+    fn new(counts: &'a [u32]) -> Self {
+        Self { counts, face: 0, triangle: 0 }
     }
 
-    fn at(&self, face: u32) -> u32 {
-        self.0[face as usize]
-    }
-
-    fn faces(&self) -> u32 {
-        self.0.len() as u32 - 1
+    /// The first triangle of that face, or of one behind the last.
+    fn at(&mut self, face: u32) -> u32 {
+        let face = face as usize;
+        self.triangle += self.counts[self.face..face].iter().map(|count| count - 2).sum::<u32>();
+        self.face = face;
+        self.triangle
     }
 }
 
-fn meshes(objects: &[u32], starts: &TriangleStarts) -> Vec<Mesh> {
+fn meshes(objects: &[u32], counts: &[u32]) -> Vec<Mesh> {
     let borders = if objects.len() > MAX_MESHES { &[] } else { objects };
     let firsts = std::iter::once(0).chain(borders.iter().copied());
-    let ends = borders.iter().copied().chain([starts.faces()]);
+    let ends = borders.iter().copied().chain([counts.len() as u32]);
+    let mut starts = TriangleStarts::new(counts);
     firsts
         .zip(ends)
         .filter(|(first, end)| first < end)
-        .map(|(first, end)| Mesh {
-            first_face: first,
-            face_count: end - first,
-            first_triangle: starts.at(first),
-            triangle_count: starts.at(end) - starts.at(first),
+        .map(|(first_face, end)| {
+            let first_triangle = starts.at(first_face);
+            let triangle_count = starts.at(end) - first_triangle;
+            Mesh { first_face, face_count: end - first_face, first_triangle, triangle_count }
         })
         .collect()
 }
@@ -187,7 +189,7 @@ fn derived_normals(
     triangles: &[[u32; 3]],
     smooth_angle_deg: Option<f32>,
     groups: &[(u32, u32)],
-    starts: &TriangleStarts,
+    counts: &[u32],
 ) -> Option<DerivedNormals> {
     if let Some(angle) = smooth_angle_deg {
         return Some(normals::derive(positions, triangles, Smoothing::AngleDeg(angle.into())));
@@ -196,9 +198,11 @@ fn derived_normals(
         return None;
     }
     let mut of_triangles = vec![0; triangles.len()];
-    let ends = groups.iter().skip(1).map(|&(face, _)| face).chain([starts.faces()]);
-    for (&(first, group), end) in groups.iter().zip(ends) {
-        of_triangles[starts.at(first) as usize..starts.at(end) as usize].fill(group);
+    let mut starts = TriangleStarts::new(counts);
+    let firsts: Vec<u32> = groups.iter().map(|&(face, _)| starts.at(face)).collect();
+    let ends = firsts.iter().skip(1).copied().chain([triangles.len() as u32]);
+    for ((&first, end), &(_, group)) in firsts.iter().zip(ends).zip(groups) {
+        of_triangles[first as usize..end as usize].fill(group);
     }
     Some(normals::derive(positions, triangles, Smoothing::Groups(&of_triangles)))
 }

@@ -57,8 +57,8 @@ pub(super) fn bounds(text: &Text) -> Bounds {
     scan::positions(&text.joined, |p| {
         if p.iter().all(|x| x.is_finite()) {
             for k in 0..3 {
-                min[k] = min[k].min(p[k]);
-                max[k] = max[k].max(p[k]);
+                min[k] = if p[k] < min[k] { p[k] } else { min[k] };
+                max[k] = if p[k] > max[k] { p[k] } else { max[k] };
             }
         }
     });

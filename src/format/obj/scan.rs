@@ -7,6 +7,7 @@ use crate::format::text::{
     Tally, first_word, is_blank, is_line_end, line_end, trimmed, without_comment, words,
 };
 use crate::scene::ABSENT;
+use memchr::memchr;
 
 /// What is in an OBJ, in file order. Faces are counted from 0; `(face, x)` means: x holds from that face on.
 #[derive(Debug, Default)]
@@ -39,8 +40,6 @@ pub(super) struct Scan<'a> {
 pub(super) struct FaceList {
     /// Corners of each face.
     pub counts: Vec<u32>,
-    /// Where each face's statement begins in the text.
-    pub offsets: Vec<u32>,
     /// Position indices of all corners.
     pub positions: Vec<u32>,
     /// Their texture coordinates; empty where no corner has one.
@@ -97,7 +96,6 @@ pub(super) fn scan(text: &[u8]) -> Scan<'_> {
     let expected = text.len() / 64;
     scan.positions.reserve(expected);
     scan.faces.counts.reserve(expected);
-    scan.faces.offsets.reserve(expected);
     scan.faces.positions.reserve(3 * expected);
     let mut at = 0;
     while at < text.len() {
@@ -106,17 +104,28 @@ pub(super) fn scan(text: &[u8]) -> Scan<'_> {
     scan
 }
 
-/// Calls `found` with each position of a text whose continued lines are joined, and with nothing else.
+/// Calls `found` with each position of a text whose continued lines are joined, and looks at little else.
 pub(super) fn positions(text: &[u8], mut found: impl FnMut([f32; 3])) {
     let mut at = 0;
-    while at < text.len() {
-        at = skip_blanks(text, at);
-        if byte(text, at) == b'v' && ends_word(byte(text, at + 1)) {
-            let (position, end, _) = numbers::<3>(text, at + 1);
-            found(position);
-            at = end;
+    while let Some(start) = next_statement(text, b'v', at) {
+        let (position, end, _) = numbers::<3>(text, start + 1);
+        found(position);
+        at = end;
+    }
+}
+
+/// Where the next statement begins whose word is this one letter. The letter is looked for, not the lines: it is rare
+/// in all others.
+fn next_statement(text: &[u8], word: u8, mut at: usize) -> Option<usize> {
+    loop {
+        let start = at + memchr(word, &text[at..])?;
+        at = start + 1;
+        if ends_word(byte(text, at)) {
+            let before = text[..start].iter().rev().find(|&&b| !is_blank(b));
+            if before.is_none_or(|&b| is_line_end(b)) {
+                return Some(start);
+            }
         }
-        at = line_end(text, at) + 1;
     }
 }
 
@@ -200,7 +209,6 @@ impl<'a> Scan<'a> {
             self.oddities.short_faces.add(start);
         } else {
             self.faces.counts.push(count as u32);
-            self.faces.offsets.push(start as u32);
         }
         after_line(text, at)
     }
@@ -313,21 +321,23 @@ fn smoothing_group(rest: &[u8]) -> u32 {
     if word == b"on" { 1 } else { str::from_utf8(word).ok().and_then(|w| w.parse().ok()).unwrap_or(0) }
 }
 
-/// Place in the text of the `index`-th position's statement.
+/// Where the statement of the `index`-th position begins.
 pub(super) fn position_offset(text: &[u8], index: u32) -> Option<usize> {
+    statements(text, b'v').nth(index as usize)
+}
+
+/// Where the statement of the `index`-th face begins, of those with three corners and more.
+pub(super) fn face_offset(text: &[u8], index: u32) -> Option<usize> {
+    statements(text, b'f').filter(|&start| face_words(text, start).nth(2).is_some()).nth(index as usize)
+}
+
+fn statements(text: &[u8], word: u8) -> impl Iterator<Item = usize> {
     let mut at = 0;
-    let mut left = index;
-    while at < text.len() {
-        let start = skip_blanks(text, at);
-        if byte(text, start) == b'v' && ends_word(byte(text, start + 1)) {
-            if left == 0 {
-                return Some(start);
-            }
-            left -= 1;
-        }
-        at = line_end(text, start) + 1;
-    }
-    None
+    std::iter::from_fn(move || {
+        let start = next_statement(text, word, at)?;
+        at = start + 1;
+        Some(start)
+    })
 }
 
 /// The words of the face at `offset`, one a corner.
