@@ -13,18 +13,22 @@ use std::path::{Path, PathBuf};
 
 /// Materials by name.
 #[derive(Clone, Debug, Default)]
-pub struct Library(HashMap<Vec<u8>, Part<Material>>);
+pub struct Library {
+    materials: HashMap<Vec<u8>, Part<Material>>,
+    /// Whether a file that may define more was not found, which was told already.
+    pub(super) incomplete: bool,
+}
 
 impl Library {
     /// The material of that name.
     pub fn get(&self, name: &[u8]) -> Option<&Part<Material>> {
-        self.0.get(name)
+        self.materials.get(name)
     }
 }
 
 impl FromIterator<(Vec<u8>, Part<Material>)> for Library {
     fn from_iter<I: IntoIterator<Item = (Vec<u8>, Part<Material>)>>(materials: I) -> Self {
-        Self(materials.into_iter().collect())
+        Self { materials: materials.into_iter().collect(), incomplete: false }
     }
 }
 
@@ -43,6 +47,7 @@ pub(super) struct Loader<'a> {
     entries: HashMap<Vec<u8>, Entry>,
     lookup: Lookup,
     contents: HashMap<PathBuf, Option<PartHash>>,
+    incomplete: bool,
     /// Every file that was read, in order.
     pub inputs: Vec<PathBuf>,
     /// Their bytes.
@@ -57,6 +62,7 @@ impl<'a> Loader<'a> {
             entries: HashMap::new(),
             lookup: Lookup::default(),
             contents: HashMap::new(),
+            incomplete: false,
             inputs: Vec::new(),
             bytes_read: 0,
         }
@@ -88,7 +94,7 @@ impl<'a> Loader<'a> {
                 materials.insert(name.to_vec(), Part::new(self.material(entry, warnings)));
             }
         }
-        Ok(Library(materials))
+        Ok(Library { materials, incomplete: self.incomplete })
     }
 
     /// Reads the files that one `mtllib` names: all of it is one name with blanks, or else several. Of materials
@@ -112,6 +118,7 @@ impl<'a> Loader<'a> {
                     shown(&name)
                 );
                 warnings.add(Some(self.obj), None, text);
+                self.incomplete = true;
                 continue;
             };
             match self.read_library(&path, warnings) {
@@ -120,7 +127,10 @@ impl<'a> Loader<'a> {
                         self.entries.entry(name).or_insert(entry);
                     }
                 }
-                Err(error) => warnings.add(Some(self.obj), None, format!("material library {error}")),
+                Err(error) => {
+                    warnings.add(Some(self.obj), None, format!("material library {error}"));
+                    self.incomplete = true;
+                }
             }
         }
     }

@@ -64,7 +64,7 @@ fn last_digits(text: &[u8], at: usize) -> (u64, usize) {
 
 /// The number at `at` and the place behind it; None where it is malformed. The place is then that of the next
 /// blank, comment or line end.
-#[inline(always)]
+#[inline]
 pub(super) fn float(text: &[u8], at: usize) -> (Option<f32>, usize) {
     match short_decimal(text, at) {
         Some((value, end)) => (Some(value), end),
@@ -74,7 +74,7 @@ pub(super) fn float(text: &[u8], at: usize) -> (Option<f32>, usize) {
 
 /// A sign, up to six digits, a point, and up to eight digits, the way nearly all numbers are written: both places
 /// where something else than a digit stands are found at once, and the next number need not wait for the value.
-#[inline(always)]
+#[inline]
 fn short_decimal(text: &[u8], start: usize) -> Option<(f32, usize)> {
     let window = text.get(start..)?.first_chunk::<24>()?;
     let eight = |at: usize| window.get(at..)?.first_chunk().map(|chunk| u64::from_le_bytes(*chunk));
@@ -90,8 +90,15 @@ fn short_decimal(text: &[u8], start: usize) -> Option<(f32, usize)> {
     if point == 8 || !sound {
         return None;
     }
-    let whole = value(low >> (8 * signed), point - signed);
-    let mantissa = whole * INTEGER_POWERS[decimals] + value(eight(point + 1)?, decimals);
+    let (whole, count) = (low >> (8 * signed), point - signed);
+    let behind = eight(point + 1)?;
+    let mantissa = if count + decimals <= 8 {
+        // the point taken out, all digits stand in one word
+        let mask = !(u64::MAX << (8 * count));
+        value(whole & mask | behind << (8 * count), count + decimals)
+    } else {
+        value(whole, count) * INTEGER_POWERS[decimals] + value(behind, decimals)
+    };
     // fifteen digits are exact; the product is the quotient but for 2 units in the last place, which is as good as
     // exact unless halfway between two f32 is as near
     let value = mantissa as i64 as f64 * INVERSE_POWERS[decimals];

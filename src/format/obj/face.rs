@@ -21,7 +21,7 @@ pub(super) struct Corner {
 
 /// Reads the corner at `at`; the place behind it. `so_far`: how many positions, texture coordinates and normals
 /// stand before it, from which negative indices count.
-#[inline(always)]
+#[inline]
 pub(super) fn corner(text: &[u8], at: usize, so_far: [usize; 3]) -> (Corner, usize) {
     let mut corner = Corner { position: ABSENT, texcoord: ABSENT, normal: ABSENT };
     let mut at = at;
@@ -48,7 +48,7 @@ fn malformed(text: &[u8], mut at: usize) -> (Corner, usize) {
 }
 
 /// One index: [`ABSENT`] where there is no digit.
-#[inline(always)]
+#[inline]
 fn index(text: &[u8], at: usize, so_far: usize) -> (u32, usize) {
     let (value, count) = digits(text, at);
     if count == 0 {

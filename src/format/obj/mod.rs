@@ -105,7 +105,9 @@ impl<'a> Lines<'a> {
         self.warn_of_oddities(warnings);
         self.settle_attributes(warnings);
         let used = mesh::materials(&self.scan, library);
-        if let Some(name) = used.unknown.first() {
+        if let Some(name) = used.unknown.first()
+            && !library.incomplete
+        {
             let text = format!("material `{}` is in no library; its faces get the default", shown(name));
             warnings.add_times(Some(self.path), None, text, used.unknown.len() as u64);
         }
