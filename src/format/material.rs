@@ -11,6 +11,9 @@ use crate::warning::Warnings;
 use std::collections::{HashMap, HashSet};
 use std::path::{Path, PathBuf};
 
+/// An OBJ may name so many libraries; each costs a look at the disk.
+const MAX_LIBRARIES: usize = 1024;
+
 /// Materials by name.
 #[derive(Clone, Debug, Default)]
 pub struct Library {
@@ -75,10 +78,7 @@ impl<'a> Loader<'a> {
         names: impl Iterator<Item = &'n [u8]>,
         warnings: &mut Warnings,
     ) -> Result<Library, FormatError> {
-        let mut seen = HashSet::new();
-        for statement in libraries.iter().filter(|statement| seen.insert(**statement)) {
-            self.read_libraries(statement, warnings);
-        }
+        self.read_libraries(libraries, warnings);
         if let Some(file) = &self.options.materials_file {
             let materials = self.read_library(file, warnings)?;
             self.entries.extend(materials);
@@ -97,42 +97,48 @@ impl<'a> Loader<'a> {
         Ok(Library { materials, incomplete: self.incomplete })
     }
 
-    /// Reads the files that one `mtllib` names: all of it is one name with blanks, or else several. Of materials
-    /// with one name in several files that of the first stands, as the format says.
-    fn read_libraries(&mut self, statement: &[u8], warnings: &mut Warnings) {
-        let folder = folder(self.obj);
-        let whole = self
-            .lookup
-            .find(statement, &[folder])
-            .or_else(|| self.lookup.find(&unescaped(statement), &[folder]));
-        let found: Vec<_> = if whole.is_some() {
-            vec![(statement.to_vec(), whole)]
-        } else {
-            let names = split_escaped(statement);
-            names.into_iter().map(|name| (name.clone(), self.lookup.find(&name, &[folder]))).collect()
-        };
-        for (name, path) in found {
-            let Some(path) = path else {
-                let text = format!(
-                    "material library `{}` is not found; its materials are the default",
-                    shown(&name)
-                );
-                warnings.add(Some(self.obj), None, text);
-                self.incomplete = true;
-                continue;
-            };
-            match self.read_library(&path, warnings) {
-                Ok(materials) => {
-                    for (name, entry) in materials {
-                        self.entries.entry(name).or_insert(entry);
-                    }
+    /// Reads the files behind `mtllib`. Of materials with one name in several files that of the first stands, as the
+    /// format says.
+    fn read_libraries(&mut self, statements: &[&[u8]], warnings: &mut Warnings) {
+        let mut seen = HashSet::new();
+        let mut named = 0;
+        for statement in statements.iter().filter(|statement| seen.insert(**statement)) {
+            for name in self.library_names(statement) {
+                named += 1;
+                if named > MAX_LIBRARIES {
+                    let text = format!(
+                        "more than {MAX_LIBRARIES} material libraries are named; the others are left out"
+                    );
+                    return warnings.add(Some(self.obj), None, text);
                 }
-                Err(error) => {
-                    warnings.add(Some(self.obj), None, format!("material library {error}"));
+                if let Err(text) = self.read_named(&name, warnings) {
+                    warnings.add(Some(self.obj), None, text);
                     self.incomplete = true;
                 }
             }
         }
+    }
+
+    /// What stands behind one `mtllib` is one name with blanks if there is such a file, else several.
+    fn library_names(&mut self, statement: &[u8]) -> Vec<Vec<u8>> {
+        let whole = [statement.to_vec(), unescaped(statement)];
+        let mut found =
+            whole.into_iter().filter(|name| self.lookup.find(name, &[folder(self.obj)]).is_some());
+        found.next().map_or_else(|| split_escaped(statement), |name| vec![name])
+    }
+
+    /// Reads one library; else what to say.
+    fn read_named(&mut self, name: &[u8], warnings: &mut Warnings) -> Result<(), String> {
+        let Some(path) = self.lookup.find(name, &[folder(self.obj)]) else {
+            let name = shown(name);
+            return Err(format!("material library `{name}` is not found; its materials are the default"));
+        };
+        let materials =
+            self.read_library(&path, warnings).map_err(|error| format!("material library {error}"))?;
+        for (name, entry) in materials {
+            self.entries.entry(name).or_insert(entry);
+        }
+        Ok(())
     }
 
     fn read_library(

@@ -28,7 +28,7 @@ pub(super) fn byte(text: &[u8], at: usize) -> u8 {
 fn others(bytes: u64) -> u64 {
     // a digit becomes 0 to 9; adding 0x76 lifts everything else below 0x80, and only that, to 0x80
     let ones = bytes ^ 0x3030_3030_3030_3030;
-    ((ones & 0x7F7F_7F7F_7F7F_7F7F) + 0x7676_7676_7676_7676 | ones) & 0x8080_8080_8080_8080
+    (((ones & 0x7F7F_7F7F_7F7F_7F7F) + 0x7676_7676_7676_7676) | ones) & 0x8080_8080_8080_8080
 }
 
 /// The value of the first `count` bytes, at most eight, all digits.

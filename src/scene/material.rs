@@ -3,7 +3,7 @@
 use super::part::{Content, PartHash, PartHasher};
 use std::path::PathBuf;
 
-/// A file that a material names (map_Kd and the like).
+/// A file that a material names (`map_Kd` and the like).
 #[derive(Clone, Debug, PartialEq)]
 pub struct MapFile {
     /// The word before it, as `map_Kd`.

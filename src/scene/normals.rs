@@ -11,7 +11,7 @@ use std::collections::HashMap;
 
 /// A position used by more triangles than this keeps flat normals where the angle between triangles decides: each
 /// of its triangles is compared with each other.
-pub const MAX_TRIANGLES_PER_POSITION: usize = 4096;
+pub const MAX_TRIANGLES_PER_POSITION: usize = 1024;
 
 /// Over which triangles a normal is the mean.
 #[derive(Clone, Copy, Debug)]

@@ -112,6 +112,10 @@ impl<'a> Lines<'a> {
             warnings.add_times(Some(self.path), None, text, used.unknown.len() as u64);
         }
         let geometry = mesh::geometry(self.scan, used.runs, used.materials, options.smooth_angle_deg);
+        if is_invisible(&geometry) {
+            let text = "every face is wholly transparent (d 0); nothing will be seen of them";
+            warnings.add(Some(self.path), None, text);
+        }
         Parsed { geometry, material_names: used.names }
     }
 
@@ -151,4 +155,14 @@ impl<'a> Lines<'a> {
             warnings.add_times(Some(self.path), None, text, count);
         }
     }
+}
+
+/// Whether there are faces and all of them have d 0, in a model where that hides them: some exporters write it
+/// everywhere.
+fn is_invisible(geometry: &Geometry) -> bool {
+    let hides = |&[_, slot]: &[u32; 2]| {
+        geometry.materials.get(slot as usize).is_some_and(|m| m.d == 0.0 && !matches!(m.illum, 4 | 6 | 7 | 9))
+    };
+    let runs = &geometry.material_runs.0;
+    !runs.is_empty() && runs.iter().all(hides)
 }

@@ -64,7 +64,7 @@ pub(super) struct Oddities<'a> {
 }
 
 /// Statements of the format that have no effect on a picture of polygons.
-const WITHOUT_EFFECT: [&[u8]; 16] = [
+const WITHOUT_EFFECT: [&[u8]; 14] = [
     b"g",
     b"mg",
     b"lod",
@@ -77,8 +77,6 @@ const WITHOUT_EFFECT: [&[u8]; 16] = [
     b"usemap",
     b"ctech",
     b"stech",
-    b"call",
-    b"csh",
     b"vw",
     b"end",
 ];
@@ -141,8 +139,8 @@ impl<'a> Scan<'a> {
                 let (values, at, malformed) = numbers::<1>(text, start + 2);
                 let (second, at) = optional(text, at);
                 // one number is a place along a line; a second that is malformed must not pass for 0
-                self.texcoords.push([values[0], second.unwrap_or(Some(0.0)).unwrap_or(f32::NAN)]);
-                self.note_malformed(malformed || second == Some(None), start);
+                self.texcoords.push([values[0], second.unwrap_or(0.0)]);
+                self.note_malformed(malformed || second.is_some_and(f32::is_nan), start);
                 after_line(text, at)
             }
             (b'v', b'n') if ends_word(byte(text, start + 2)) => {
@@ -181,7 +179,7 @@ impl<'a> Scan<'a> {
         while count < values.len()
             && let (Some(value), end) = optional(text, at)
         {
-            values[count] = value.unwrap_or(f32::NAN);
+            values[count] = value;
             count += 1;
             at = end;
         }
@@ -305,14 +303,14 @@ fn numbers<const N: usize>(text: &[u8], mut at: usize) -> ([f32; N], usize, bool
     (values, skip_blanks(text, at), malformed)
 }
 
-/// One number that need not be there: None where the line ends, Some(None) where it is malformed.
+/// One number that need not be there, NaN where it is malformed; None where the line ends.
 #[inline]
-fn optional(text: &[u8], at: usize) -> (Option<Option<f32>>, usize) {
+fn optional(text: &[u8], at: usize) -> (Option<f32>, usize) {
     if ends_line(byte(text, at)) {
         return (None, at);
     }
     let (number, end) = float(text, at);
-    (Some(number), skip_blanks(text, end))
+    (Some(number.unwrap_or(f32::NAN)), skip_blanks(text, end))
 }
 
 /// `s off` and everything that is no number are group 0: none.

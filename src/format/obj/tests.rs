@@ -224,6 +224,21 @@ fn materials_have_slots_by_content() {
 }
 
 #[test]
+fn faces_that_are_all_transparent_are_told_of() {
+    let ghost = Part::new(Material { d: 0.0, ..Material::default() });
+    let library: Library = [(b"ghost".to_vec(), ghost)].into_iter().collect();
+    let warned = |obj: &str| {
+        let mut warnings = Warnings::default();
+        let obj = format!("{SQUARE}{obj}");
+        parse_obj(obj.as_bytes(), Path::new("a.obj"), &library, &ReadOptions::default(), &mut warnings)
+            .unwrap();
+        !warnings.is_empty()
+    };
+    assert!(warned("usemtl ghost\nf 1 2 3\n"));
+    assert!(!warned("f 1 2 3\nusemtl ghost\nf 1 2 3\n") && !warned("usemtl ghost\n"));
+}
+
+#[test]
 fn smoothing_groups_give_normals_where_there_are_none() {
     let tent = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 0 0 1\n";
     let flat = shape(format!("{tent}s off\nf 1 2 3 4\ns 0\nf 1 4 5\n"));

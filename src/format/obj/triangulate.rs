@@ -4,6 +4,9 @@
 use crate::math::DVec3;
 use glam::DVec2;
 
+/// A polygon of more corners than this is a fan, concave or not: cutting ears takes the square of their number.
+const MAX_EAR_CORNERS: usize = 16_384;
+
 /// Appends the n − 2 triangles of a polygon of n corners, as indices of `corners`.
 ///
 /// `corners`: its position indices, all within `positions`.
@@ -28,7 +31,8 @@ pub(super) fn triangulate(positions: &[[f32; 3]], corners: &[u32], out: &mut Vec
             // the sum over the fan is Newell's sum over the edges (Sutherland et al. 1974), seen from the first corner
             let fan = || points[1..].windows(2).map(|pair| pair[0].cross(pair[1]));
             let normal: DVec3 = fan().sum();
-            if fan().all(|n| n.dot(normal) > 0.0) || normal == DVec3::ZERO {
+            let is_fan = normal == DVec3::ZERO || fan().all(|n| n.dot(normal) > 0.0);
+            if is_fan || points.len() > MAX_EAR_CORNERS {
                 out.extend((1..points.len() as u32 - 1).map(|i| [0, i, i + 1]));
             } else {
                 clip_ears(&in_plane(&points, normal), out);
