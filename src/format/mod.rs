@@ -18,7 +18,7 @@ use std::sync::Arc;
 pub use error::FormatError;
 pub use material::Library;
 pub use mtl::is_mtl_word;
-pub use obj::{Parsed, parse_obj};
+pub use obj::{ParsedObj, parse_obj};
 use text::Text;
 
 /// How files are read.

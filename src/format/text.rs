@@ -189,9 +189,11 @@ impl Tally {
     }
 }
 
-/// Bytes for people to read.
-pub(super) fn shown(bytes: &[u8]) -> Cow<'_, str> {
-    String::from_utf8_lossy(bytes)
+/// Bytes for people to read, the first of them where they are many.
+pub(super) fn shown(bytes: &[u8]) -> String {
+    const MANY: usize = 100;
+    let first = String::from_utf8_lossy(&bytes[..bytes.len().min(MANY)]);
+    if bytes.len() > MANY { format!("{first}…") } else { first.into_owned() }
 }
 
 #[cfg(test)]

@@ -128,6 +128,13 @@ fn next_statement(text: &[u8], word: u8, mut at: usize) -> Option<usize> {
 }
 
 impl<'a> Scan<'a> {
+    /// Each run of faces that has a material: its first face and the material's name.
+    pub(super) fn material_runs(&self) -> impl Iterator<Item = (u32, &'a [u8])> {
+        let ends =
+            self.materials.iter().skip(1).map(|&(face, _)| face).chain([self.faces.counts.len() as u32]);
+        self.materials.iter().copied().zip(ends).filter(|((face, _), end)| face < end).map(|(run, _)| run)
+    }
+
     /// Reads the statement at `start`; the place where the next line begins.
     #[inline]
     fn statement(&mut self, text: &'a [u8], start: usize) -> usize {

@@ -12,7 +12,7 @@ fn library() -> Library {
         .collect()
 }
 
-fn parse(obj: impl AsRef<[u8]>, lenient: bool) -> (Result<Parsed, String>, Vec<String>) {
+fn parse(obj: impl AsRef<[u8]>, lenient: bool) -> (Result<ParsedObj, String>, Vec<String>) {
     let options = ReadOptions { lenient, ..ReadOptions::default() };
     let mut warnings = Warnings::default();
     let parsed = parse_obj(obj.as_ref(), Path::new("a.obj"), &library(), &options, &mut warnings);
