@@ -91,6 +91,7 @@ pub fn load_obj(path: &Path, options: &ReadOptions) -> Result<Loaded, FormatErro
 
 /// The box of the positions in an OBJ that are finite, as [`load_obj`] gives them; empty where there is none.
 pub fn scan_bounds(path: &Path) -> Result<Bounds, FormatError> {
-    let bytes = text::read(path)?;
-    Ok(obj::bounds(&Text::new(&bytes, path)?))
+    let mut bounds = Bounds::EMPTY;
+    text::read_pieces(path, |text| obj::add_to_bounds(&mut bounds, text))?;
+    Ok(bounds)
 }

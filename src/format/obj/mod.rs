@@ -51,8 +51,8 @@ pub fn parse_obj(
     Ok(lines.into_parsed(library, options, warnings))
 }
 
-/// The box of the positions in an OBJ's bytes that are finite: of [`Geometry::positions`], without the rest.
-pub(super) fn bounds(text: &Text) -> Bounds {
+/// Grows a box by the finite positions in (a part of) an OBJ: those of [`Geometry::positions`], without the rest.
+pub(super) fn add_to_bounds(bounds: &mut Bounds, text: &Text) {
     let (mut min, mut max) = ([f32::INFINITY; 3], [f32::NEG_INFINITY; 3]);
     scan::positions(&text.joined, |p| {
         if p.iter().all(|x| x.is_finite()) {
@@ -62,7 +62,7 @@ pub(super) fn bounds(text: &Text) -> Bounds {
             }
         }
     });
-    Bounds { min: DVec3::from(min.map(f64::from)), max: DVec3::from(max.map(f64::from)) }
+    bounds.merge(&Bounds { min: DVec3::from(min.map(f64::from)), max: DVec3::from(max.map(f64::from)) });
 }
 
 impl<'a> Lines<'a> {
