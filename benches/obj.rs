@@ -40,6 +40,7 @@ fn main() {
 
 fn measure(file: &Path) {
     let options = ReadOptions::default();
+    let triangles = tobj::LoadOptions { triangulate: true, ..Default::default() };
     let mut ms = [const { Vec::new() }; 3];
     for _ in 0..RUNS {
         let timed = |run: &dyn Fn()| {
@@ -47,7 +48,7 @@ fn measure(file: &Path) {
             run();
             watch.ms()
         };
-        ms[0].push(timed(&|| drop(black_box(tobj::load_obj(file, &tobj::LoadOptions::default())))));
+        ms[0].push(timed(&|| drop(black_box(tobj::load_obj(file, &triangles)))));
         ms[1].push(timed(&|| drop(black_box(load_obj(file, &options)))));
         ms[2].push(timed(&|| drop(black_box(scan_bounds(file)))));
     }

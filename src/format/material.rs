@@ -235,7 +235,7 @@ impl Given {
     fn change(&mut self, change: &MaterialOverride) -> Result<(), FormatError> {
         for (word, value) in &change.words {
             self.set(word.as_bytes(), value.as_bytes()).map_err(|_| FormatError::BadOverride {
-                name: shown(&change.name).into_owned(),
+                name: shown(&change.name),
                 word: word.clone(),
                 value: value.clone(),
             })?;

@@ -18,7 +18,7 @@ use std::sync::Arc;
 pub use error::FormatError;
 pub use material::Library;
 pub use mtl::is_mtl_word;
-pub use obj::{Parsed, parse_obj};
+pub use obj::{ParsedObj, parse_obj};
 use text::Text;
 
 /// How files are read.
@@ -94,8 +94,9 @@ pub fn load_obj(path: &Path, options: &ReadOptions) -> Result<Loaded, FormatErro
 
 /// The box of the positions in an OBJ that are finite, as [`load_obj`] gives them; empty where there is none.
 pub fn scan_bounds(path: &Path) -> Result<Bounds, FormatError> {
-    let bytes = text::read(path)?;
-    Ok(obj::bounds(&Text::new(&bytes, path)?))
+    let mut bounds = Bounds::EMPTY;
+    text::read_pieces(path, |text| obj::add_to_bounds(&mut bounds, text))?;
+    Ok(bounds)
 }
 
 /// The libraries that an OBJ names and the maps of all their materials, as far as they are there. The shape is not

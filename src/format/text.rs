@@ -2,9 +2,10 @@
 //! for UTF-8.
 
 use super::error::FormatError;
-use memchr::memchr_iter;
+use memchr::{memchr_iter, memrchr_iter};
 use std::borrow::Cow;
-use std::fs;
+use std::fs::{self, File};
+use std::io::{self, Read};
 use std::path::Path;
 
 /// The longest file that is read: what a line can name (corners, triangles, three normals each) then fits 32 bits.
@@ -30,16 +31,79 @@ pub(super) fn ends_number(byte: u8) -> bool {
 
 /// Reads a plain file whole.
 pub(super) fn read(path: &Path) -> Result<Vec<u8>, FormatError> {
-    let unreadable = |source| FormatError::Unreadable { path: path.to_path_buf(), source };
-    let metadata = fs::metadata(path).map_err(unreadable)?;
+    let (mut file, length) = open(path)?;
+    let mut bytes = Vec::with_capacity(length as usize + 1);
+    file.read_to_end(&mut bytes).map_err(|source| unreadable(path, source))?;
+    within_limit(path, bytes.len() as u64)?;
+    Ok(bytes)
+}
+
+/// Bytes read at a time by [`read_pieces`]: what a core's second cache holds.
+const PIECE_BYTES: usize = 256 << 10;
+
+/// Reads a plain file in pieces of whole lines, continued ones not parted, and gives each to `take`. No more is held
+/// than a piece, or a line where that is longer.
+pub(super) fn read_pieces(path: &Path, mut take: impl FnMut(&Text)) -> Result<(), FormatError> {
+    let (mut file, _) = open(path)?;
+    let mut buffer = Vec::new();
+    let mut held = 0;
+    let mut is_first = true;
+    loop {
+        if buffer.len() - held < PIECE_BYTES {
+            buffer.resize(held + PIECE_BYTES, 0);
+        }
+        let read = fill(&mut file, &mut buffer[held..]).map_err(|source| unreadable(path, source))?;
+        let bytes = &buffer[..held + read];
+        let is_last = bytes.len() < buffer.len();
+        let mut line_ends = memrchr_iter(b'\n', &bytes[held..]).map(|end| held + end);
+        let end = line_ends.find(|&end| !continues(bytes, end)).map_or(0, |end| end + 1);
+        let end = if is_last { bytes.len() } else { end };
+        if end > 0 {
+            take(&if is_first { Text::new(&bytes[..end], path)? } else { Text::of_lines(&bytes[..end]) });
+            is_first = false;
+        }
+        if is_last {
+            return Ok(());
+        }
+        held = bytes.len() - end;
+        buffer.copy_within(end..end + held, 0);
+    }
+}
+
+/// Reads until the buffer is full or the file ends; how many bytes.
+fn fill(file: &mut impl Read, buffer: &mut [u8]) -> io::Result<usize> {
+    let mut filled = 0;
+    while filled < buffer.len() {
+        match file.read(&mut buffer[filled..]) {
+            Ok(0) => break,
+            Ok(count) => filled += count,
+            Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
+            Err(error) => return Err(error),
+        }
+    }
+    Ok(filled)
+}
+
+/// Whether the line whose LF stands at `end` may be continued.
+fn continues(bytes: &[u8], end: usize) -> bool {
+    bytes[..end].strip_suffix(b"\r").unwrap_or(&bytes[..end]).ends_with(b"\\")
+}
+
+fn unreadable(path: &Path, source: io::Error) -> FormatError {
+    FormatError::Unreadable { path: path.to_path_buf(), source }
+}
+
+/// Opens a plain file that is not too long; its length, which may grow.
+fn open(path: &Path) -> Result<(io::Take<File>, u64), FormatError> {
+    let metadata = fs::metadata(path).map_err(|source| unreadable(path, source))?;
     // a pipe or a device could keep us waiting, or never end
     if !metadata.is_file() {
         return Err(FormatError::NotAFile { path: path.to_path_buf() });
     }
     within_limit(path, metadata.len())?;
-    let bytes = fs::read(path).map_err(unreadable)?;
-    within_limit(path, bytes.len() as u64)?;
-    Ok(bytes)
+    let file = File::open(path).map_err(|source| unreadable(path, source))?;
+    // a byte more than the limit tells a file that has grown beyond it
+    Ok((file.take(MAX_FILE_BYTES + 1), metadata.len()))
 }
 
 fn within_limit(path: &Path, bytes: u64) -> Result<(), FormatError> {
@@ -68,7 +132,12 @@ impl<'a> Text<'a> {
             return Err(FormatError::Utf16 { path: path.to_path_buf() });
         }
         let as_written = bytes.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(bytes);
-        Ok(Self { as_written, joined: join_lines(as_written) })
+        Ok(Self::of_lines(as_written))
+    }
+
+    /// Takes bytes that are text.
+    fn of_lines(as_written: &'a [u8]) -> Self {
+        Self { as_written, joined: join_lines(as_written) }
     }
 
     /// The line, from 1, in which the byte at `offset` stands.
@@ -189,9 +258,11 @@ impl Tally {
     }
 }
 
-/// Bytes for people to read.
-pub(super) fn shown(bytes: &[u8]) -> Cow<'_, str> {
-    String::from_utf8_lossy(bytes)
+/// Bytes for people to read, the first of them where they are many.
+pub(super) fn shown(bytes: &[u8]) -> String {
+    const MANY: usize = 100;
+    let first = String::from_utf8_lossy(&bytes[..bytes.len().min(MANY)]);
+    if bytes.len() > MANY { format!("{first}…") } else { first.into_owned() }
 }
 
 #[cfg(test)]
@@ -228,6 +299,32 @@ mod tests {
         }
         for plain in [&b""[..], b"v", b"\xEF\xBB\xBFv 1 2 3", b"o \xE6\n", b"\0\0\0\0\0\0"] {
             assert_eq!(refused(plain), None);
+        }
+    }
+
+    #[test]
+    fn pieces_are_whole_lines() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.obj");
+        let long = format!("f {}\n", "1 \\\n".repeat(PIECE_BYTES / 3));
+        for (content, pieces) in [
+            (String::new(), 0),
+            ("v 1 2 3".to_owned(), 1),
+            ("v 1 2 3\n".repeat(PIECE_BYTES / 4), 2),
+            ("v 1 2 3 \\\r\n".repeat(PIECE_BYTES / 4), 1),
+            (long.repeat(3), 3),
+            ("x".repeat(PIECE_BYTES), 1),
+        ] {
+            fs::write(&path, &content).unwrap();
+            let (mut joined, mut count) = (Vec::new(), 0);
+            let mut take = |text: &Text| {
+                joined.extend_from_slice(&text.joined);
+                count += 1;
+            };
+            read_pieces(&path, &mut take).unwrap();
+            let whole = Text::new(content.as_bytes(), &path).unwrap();
+            assert!(joined == whole.joined.as_ref(), "{} bytes", content.len());
+            assert_eq!(count, pieces, "{} bytes", content.len());
         }
     }
 

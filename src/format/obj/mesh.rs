@@ -32,14 +32,10 @@ pub(super) fn materials<'a>(scan: &Scan<'a>, library: &Library) -> UsedMaterials
         UsedMaterials { materials: Vec::new(), names: Vec::new(), runs: Vec::new(), unknown: Vec::new() };
     let mut slot_of_content: HashMap<PartHash, u32> = HashMap::new();
     let mut slot_of_name: HashMap<&[u8], u32> = HashMap::new();
-    let ends = scan.materials.iter().skip(1).map(|&(face, _)| face).chain([faces]);
     if faces > 0 && scan.materials.first().is_none_or(|&(face, _)| face > 0) {
         used.runs.push((0, ABSENT));
     }
-    for (&(face, name), end) in scan.materials.iter().zip(ends) {
-        if face == end {
-            continue;
-        }
+    for (face, name) in scan.material_runs() {
         let slot = *slot_of_name.entry(name).or_insert_with(|| {
             let Some(material) = library.get(name) else { return ABSENT };
             *slot_of_content.entry(material.hash()).or_insert_with(|| {

@@ -23,7 +23,7 @@ use std::path::Path;
 
 /// The shape in an OBJ's bytes and the names of its materials.
 #[derive(Clone, Debug)]
-pub struct Parsed {
+pub struct ParsedObj {
     /// Shape and materials.
     pub geometry: Geometry,
     /// For each slot of [`Geometry::materials`] the first name under which it was used.
@@ -45,14 +45,14 @@ pub fn parse_obj(
     library: &Library,
     options: &ReadOptions,
     warnings: &mut Warnings,
-) -> Result<Parsed, FormatError> {
+) -> Result<ParsedObj, FormatError> {
     let text = Text::new(bytes, path)?;
     let lines = Lines::new(&text, path, options.lenient, warnings)?;
     Ok(lines.into_parsed(library, options, warnings))
 }
 
-/// The box of the positions in an OBJ's bytes that are finite: of [`Geometry::positions`], without the rest.
-pub(super) fn bounds(text: &Text) -> Bounds {
+/// Grows a box by the finite positions in (a part of) an OBJ: those of [`Geometry::positions`], without the rest.
+pub(super) fn add_to_bounds(bounds: &mut Bounds, text: &Text) {
     let (mut min, mut max) = ([f32::INFINITY; 3], [f32::NEG_INFINITY; 3]);
     scan::positions(&text.joined, |p| {
         if p.iter().all(|x| x.is_finite()) {
@@ -62,7 +62,7 @@ pub(super) fn bounds(text: &Text) -> Bounds {
             }
         }
     });
-    Bounds { min: DVec3::from(min.map(f64::from)), max: DVec3::from(max.map(f64::from)) }
+    bounds.merge(&Bounds { min: DVec3::from(min.map(f64::from)), max: DVec3::from(max.map(f64::from)) });
 }
 
 /// What stands behind each `mtllib`, found without reading the rest.
@@ -98,14 +98,7 @@ impl<'a> Lines<'a> {
 
     /// The names of materials that faces have, in order of first use, repeated where they are named again.
     pub(super) fn used_materials(&self) -> impl Iterator<Item = &'a [u8]> {
-        let faces = self.scan.faces.counts.len() as u32;
-        let ends = self.scan.materials.iter().skip(1).map(|&(face, _)| face).chain([faces]);
-        self.scan
-            .materials
-            .iter()
-            .zip(ends)
-            .filter(|&(&(face, _), end)| face < end)
-            .map(|(&(_, name), _)| name)
+        self.scan.material_runs().map(|(_, name)| name)
     }
 
     /// Makes the shape.
@@ -114,7 +107,7 @@ impl<'a> Lines<'a> {
         library: &Library,
         options: &ReadOptions,
         warnings: &mut Warnings,
-    ) -> Parsed {
+    ) -> ParsedObj {
         self.warn_of_oddities(warnings);
         self.settle_attributes(warnings);
         let used = mesh::materials(&self.scan, library);
@@ -129,7 +122,7 @@ impl<'a> Lines<'a> {
             let text = "every face is wholly transparent (d 0); nothing will be seen of them";
             warnings.add(Some(self.path), None, text);
         }
-        Parsed { geometry, material_names: used.names }
+        ParsedObj { geometry, material_names: used.names }
     }
 
     fn warn(&self, warnings: &mut Warnings, tally: Tally, text: impl Into<String>) {
@@ -145,6 +138,13 @@ impl<'a> Lines<'a> {
         self.warn(warnings, odd.unrendered, "points, lines, curves and surfaces are not rendered");
         let unknown = format!("unknown statements are skipped, the first is `{}`", shown(odd.unknown_word));
         self.warn(warnings, odd.unknown, unknown);
+        let many = triangulate::MAX_EAR_CORNERS;
+        let huge = self.scan.faces.counts.iter().filter(|&&count| count as usize > many).count();
+        if huge > 0 {
+            let text =
+                format!("a face of more than {many} corners becomes a fan, right only if it is convex");
+            warnings.add_times(Some(self.path), None, text, huge as u64);
+        }
         if self.text.joined.is_empty() {
             warnings.add(Some(self.path), None, "the file is empty; its frame shows the background");
         }

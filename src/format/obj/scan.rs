@@ -104,11 +104,13 @@ pub(super) fn scan(text: &[u8]) -> Scan<'_> {
 
 /// Calls `found` with each position of a text whose continued lines are joined, and looks at little else.
 pub(super) fn positions(text: &[u8], mut found: impl FnMut([f32; 3])) {
-    let mut at = 0;
-    while let Some(start) = next_statement(text, b'v', at) {
+    let mut next = next_statement(text, b'v', 0);
+    while let Some(start) = next {
         let (position, end, _) = numbers::<3>(text, start + 1);
         found(position);
-        at = end;
+        // mostly they stand one below the other
+        let below = (byte(text, end), byte(text, end + 1), byte(text, end + 2)) == (b'\n', b'v', b' ');
+        next = if below { Some(end + 1) } else { next_statement(text, b'v', end) };
     }
 }
 
@@ -128,6 +130,13 @@ fn next_statement(text: &[u8], word: u8, mut at: usize) -> Option<usize> {
 }
 
 impl<'a> Scan<'a> {
+    /// Each run of faces that has a material: its first face and the material's name.
+    pub(super) fn material_runs(&self) -> impl Iterator<Item = (u32, &'a [u8])> {
+        let ends =
+            self.materials.iter().skip(1).map(|&(face, _)| face).chain([self.faces.counts.len() as u32]);
+        self.materials.iter().copied().zip(ends).filter(|((face, _), end)| face < end).map(|(run, _)| run)
+    }
+
     /// Reads the statement at `start`; the place where the next line begins.
     #[inline]
     fn statement(&mut self, text: &'a [u8], start: usize) -> usize {

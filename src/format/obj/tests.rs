@@ -12,7 +12,7 @@ fn library() -> Library {
         .collect()
 }
 
-fn parse(obj: impl AsRef<[u8]>, lenient: bool) -> (Result<Parsed, String>, Vec<String>) {
+fn parse(obj: impl AsRef<[u8]>, lenient: bool) -> (Result<ParsedObj, String>, Vec<String>) {
     let options = ReadOptions { lenient, ..ReadOptions::default() };
     let mut warnings = Warnings::default();
     let parsed = parse_obj(obj.as_ref(), Path::new("a.obj"), &library(), &options, &mut warnings);
@@ -280,12 +280,20 @@ fn deformation_keeps_indices() {
     );
 }
 
+fn bounds(obj: &[u8]) -> Bounds {
+    let mut bounds = Bounds::EMPTY;
+    add_to_bounds(&mut bounds, &Text::new(obj, Path::new("a.obj")).unwrap());
+    bounds
+}
+
 #[test]
 fn bounds_are_those_of_finite_positions() {
     let obj = "  v 1 2 3 1 0 0\nvn 9 9 9\nvt 8 8\n# v 7 7 7\no v 7 7 7\nv\t-1 5 0\nv nan 99 0\nv 9 9\rv 0 0 -4 v\nvw 5 5 5";
-    let text = Text::new(obj.as_bytes(), Path::new("a.obj")).unwrap();
-    assert_eq!(bounds(&text), Bounds { min: DVec3::new(-1.0, 0.0, -4.0), max: DVec3::new(1.0, 5.0, 3.0) });
-    assert!(bounds(&Text::new(b"f 1 2 3", Path::new("a.obj")).unwrap()).is_empty());
+    assert_eq!(
+        bounds(obj.as_bytes()),
+        Bounds { min: DVec3::new(-1.0, 0.0, -4.0), max: DVec3::new(1.0, 5.0, 3.0) }
+    );
+    assert!(bounds(b"f 1 2 3").is_empty());
 }
 
 /// Small files with something of everything, to be damaged.
@@ -327,6 +335,6 @@ proptest! {
         for p in positions.iter().filter(|p| p.iter().all(|x| x.is_finite())) {
             expected.add(DVec3::from(p.map(f64::from)));
         }
-        prop_assert_eq!(bounds(&Text::new(&obj, Path::new("a.obj")).unwrap()), expected);
+        prop_assert_eq!(bounds(&obj), expected);
     }
 }

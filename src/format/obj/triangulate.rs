@@ -5,7 +5,7 @@ use crate::math::DVec3;
 use glam::DVec2;
 
 /// A polygon of more corners than this is a fan, concave or not: cutting ears takes the square of their number.
-const MAX_EAR_CORNERS: usize = 16_384;
+pub(super) const MAX_EAR_CORNERS: usize = 16_384;
 
 /// Appends the n − 2 triangles of a polygon of n corners, as indices of `corners`.
 ///
