@@ -188,12 +188,14 @@ fn many_coincident_triangles_build_in_time_and_in_bounded_depth() {
 
 #[test]
 fn the_tree_is_the_same_for_any_number_of_threads() {
-    let mesh = soup(20_000, 9);
-    let build = |threads| {
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-        pool.install(|| format!("{:?}", Tree::build(&mesh.positions, &mesh.triangles, Quality::Fastest)))
-    };
-    assert!(build(1) == build(3));
+    let mesh = soup(10_000, 9);
+    for quality in Quality::ALL {
+        let build = |threads| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+            pool.install(|| format!("{:?}", Tree::build(&mesh.positions, &mesh.triangles, quality)))
+        };
+        assert!(build(1) == build(3), "{quality:?}");
+    }
 }
 
 #[test]

@@ -4,6 +4,8 @@
 //! Watertight: a projected vertex is a function of ray and vertex alone, so neighbours see the same one; the two
 //! products of an edge's value are rounded monotonically, so its sign is right or the value is 0, and 0 counts for
 //! both neighbours, whose values are negatives of each other bit for bit (nothing is fused).
+//!
+//! Both sides of a triangle are hit, at distances above 0 only: a ray that starts in a plane does not hit it there.
 
 use super::lanes::{Lanes, per_axis};
 use super::slab::{Aabb, SlabRay};
