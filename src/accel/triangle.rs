@@ -139,10 +139,11 @@ impl Search {
         }
     }
 
-    /// Before a distance.
+    /// Before a distance; NaN is before all of them.
     #[inline(always)]
     pub(crate) fn until(end: f32) -> Self {
-        Self { before: HitOrder { distance: end, primitive: 0 }, ..Self::after(None) }
+        let distance = Lanes::max(end, f32::NEG_INFINITY);
+        Self { before: HitOrder { distance, primitive: 0 }, ..Self::after(None) }
     }
 
     /// Looks for nothing more.
