@@ -1,6 +1,7 @@
 //! Builds a tree and traces camera rays and one shadow ray a hit, on all cores, without the rest of rentix.
 //!
-//! `cargo bench --bench trace -- FILE.obj [--eye x,y,z --look-at x,y,z] [--fov 40] [--size 1280x720] [--runs 9]`
+//! `cargo bench --bench trace -- FILE.obj [--eye x,y,z --look-at x,y,z] [--fov 40] [--size 1280x720] [--runs 9]
+//! [--quality fastest]`
 //!
 //! Camera, light and rays are those of the Embree yardstick: a point light 1.5 diagonals above the box's centre, on the
 //! eye's side; shadow rays start 1e-3 of the way to the light.
@@ -36,12 +37,8 @@ fn main() {
     let camera = Camera::new(&o, &positions);
     println!("{}: {} triangles, {} threads", o.file, triangles.len(), rayon::current_num_threads());
     for quality in Quality::ALL.into_iter().filter(|q| o.quality.is_none_or(|o| o == *q)) {
-        let (build_ms, tree) = median(o.runs, || Tree::build(&positions, &triangles, quality));
-        println!(
-            "{quality:?}: build {build_ms:.1} ms, {:.1} MB, {:?}",
-            tree.bytes() as f64 / 1e6,
-            tree.counts()
-        );
+        let (build, tree) = measure(o.runs, || Tree::build(&positions, &triangles, quality));
+        println!("{quality:?}: build {build}, {:.1} MB, {:?}", tree.bytes() as f64 / 1e6, tree.counts());
         let scene = TracedScene::new(vec![TracedObject::new(Arc::new(tree), None)]);
         for &width in Width::available() {
             let scene = scene.clone().with_width(width);
@@ -68,7 +65,7 @@ fn trace(scene: &TracedScene, camera: &Camera, mode: Mode, runs: usize, name: &s
     let [w, h] = camera.size;
     let mut distances = vec![[f32::INFINITY; TILE]; w * h / TILE];
     let mut shadowed = vec![[false; TILE]; distances.len()];
-    let (camera_ms, ()) = median(runs, || {
+    let (camera_times, ()) = measure(runs, || {
         distances.par_iter_mut().with_min_len(w / 4).enumerate().for_each(|(tile, distances)| {
             let rays = camera.rays(tile);
             if mode == Mode::Batch {
@@ -80,7 +77,7 @@ fn trace(scene: &TracedScene, camera: &Camera, mode: Mode, runs: usize, name: &s
             }
         });
     });
-    let (shadow_ms, ()) = median(runs, || {
+    let (shadow_times, ()) = measure(runs, || {
         shadowed.par_iter_mut().with_min_len(w / 4).zip(&distances).enumerate().for_each(
             |(tile, (shadowed, distances))| {
                 let mut rays = camera.rays(tile);
@@ -107,16 +104,27 @@ fn trace(scene: &TracedScene, camera: &Camera, mode: Mode, runs: usize, name: &s
     });
     let hits = distances.as_flattened().iter().filter(|d| d.is_finite()).count();
     println!(
-        "{name} {mode:?}: camera {camera_ms:.1} ms ({:.1} Mray/s), shadow {shadow_ms:.1} ms ({:.1} Mray/s), together {:.1} ms; {hits} hits, {} shadowed",
-        (w * h) as f64 * 1e-3 / camera_ms,
-        hits as f64 * 1e-3 / shadow_ms,
-        camera_ms + shadow_ms,
+        "{name} {mode:?}: camera {camera_times}, shadow {shadow_times}, together {:.1} ms; {hits} hits, {} shadowed",
+        camera_times.median + shadow_times.median,
         shadowed.as_flattened().iter().filter(|s| **s).count()
     );
 }
 
-/// The median time of some runs, in ms, and the last result.
-fn median<T>(runs: usize, mut f: impl FnMut() -> T) -> (f64, T) {
+/// Times of some runs, ms.
+#[derive(Clone, Copy, Debug)]
+struct Times {
+    median: f64,
+    least: f64,
+}
+
+impl std::fmt::Display for Times {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{:.1} ms (least {:.1})", self.median, self.least)
+    }
+}
+
+/// Runs something some times after once that is not counted; gives the last result too.
+fn measure<T>(runs: usize, mut f: impl FnMut() -> T) -> (Times, T) {
     let mut last = black_box(f());
     let mut times: Vec<f64> = (0..runs.max(1))
         .map(|_| {
@@ -126,8 +134,7 @@ fn median<T>(runs: usize, mut f: impl FnMut() -> T) -> (f64, T) {
         })
         .collect();
     times.sort_by(f64::total_cmp);
-    print!("[{:.1}] ", times[0]);
-    (times[times.len() / 2], last)
+    (Times { median: times[times.len() / 2], least: times[0] }, last)
 }
 
 struct Camera {

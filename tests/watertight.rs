@@ -110,7 +110,7 @@ fn a_ray_that_leaves_a_convex_body_meets_nothing_and_one_that_enters_it_does() {
             };
             hits += 1;
             let corners = mesh.corners(hit.triangle);
-            let [a, b, c] = corners.map(|c| c.as_dvec3());
+            let [a, b, c] = corners.map(Vec3::as_dvec3);
             let normal = (b - a).cross(c - a).normalize().as_vec3();
             let point = hit_point(&corners, hit.barycentric);
             let out = random.direction();

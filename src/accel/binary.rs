@@ -77,17 +77,13 @@ impl Binary {
     }
 
     fn from_obvhs(bvh: &Bvh2) -> Self {
-        // breadth first, as reinsertion leaves children anywhere
-        let mut nodes: Vec<BinaryNode> = Vec::with_capacity(bvh.nodes.len());
-        let mut places: Vec<u32> = Vec::with_capacity(bvh.nodes.len());
-        places.push(0);
-        while let Some(from) = places.get(nodes.len()).and_then(|&p| bvh.nodes.get(p as usize)) {
-            let child = if from.is_leaf() { 0 } else { places.len() as u32 };
-            nodes.push(BinaryNode { half_area: from.aabb().half_area(), child, start: 0, count: 1 });
-            if child != 0 {
-                places.extend([from.first_index, from.first_index + 1]);
-            }
-        }
+        let nodes = bvh.nodes.par_iter().with_min_len(GRAIN).map(|n| BinaryNode {
+            half_area: n.aabb().half_area(),
+            child: if n.is_leaf() { 0 } else { n.first_index },
+            start: 0,
+            count: 1,
+        });
+        let mut nodes: Vec<BinaryNode> = nodes.collect();
         for i in (0..nodes.len()).rev() {
             let child = nodes[i].child as usize;
             if child != 0 {
@@ -98,8 +94,7 @@ impl Binary {
         for i in 0..nodes.len() {
             let BinaryNode { child, start, .. } = nodes[i];
             if child == 0 {
-                order[start as usize] =
-                    bvh.primitive_indices[bvh.nodes[places[i] as usize].first_index as usize];
+                order[start as usize] = bvh.primitive_indices[bvh.nodes[i].first_index as usize];
             } else {
                 nodes[child as usize].start = start;
                 nodes[child as usize + 1].start = start + nodes[child as usize].count;
@@ -141,6 +136,8 @@ fn build_obvhs(positions: &[[f32; 3]], triangles: &[[u32; 3]], params: BvhBuildP
     );
     if params.reinsertion_batch_ratio > 0.0 {
         ReinsertionOptimizer::default().run(&mut bvh, params.reinsertion_batch_ratio, None);
+        // reinsertion leaves children anywhere
+        bvh.reorder_in_stack_traversal_order();
     }
     bvh
 }

@@ -80,7 +80,7 @@ impl Shape {
 /// (Goldsmith and Salmon 1987). A binary node costs a share of the wide node that it dissolves in.
 fn leaves(binary: &Binary) -> Vec<bool> {
     const BLOCK_COST: f32 = 1.0;
-    const NODE_COST: f32 = 0.3;
+    const NODE_COST: f32 = 0.5;
     let mut is_leaf = vec![false; binary.nodes.len()];
     let mut cost = vec![0.0_f32; binary.nodes.len()];
     for (i, n) in binary.nodes.iter().enumerate().rev() {
@@ -132,4 +132,38 @@ fn split_by_number(s: Subtree) -> ([Subtree; WIDTH], usize) {
             Subtree { node: None, start, count: size.min(rest), is_leaf: rest.min(size) as usize <= WIDTH };
     }
     (children, count as usize)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::accel::binary::BinaryNode;
+
+    /// A tree in which each inner node has a leaf and the rest below it.
+    fn chain(leaves: u32) -> Binary {
+        let nodes = (0..2 * leaves - 1)
+            .map(|i| {
+                let is_inner = i % 2 == 0 && i < 2 * leaves - 2;
+                BinaryNode {
+                    half_area: 1.0,
+                    child: if is_inner { i + 1 } else { 0 },
+                    start: i / 2,
+                    count: if is_inner { leaves - i / 2 } else { 1 },
+                }
+            })
+            .collect();
+        Binary { nodes, order: (0..leaves).collect() }
+    }
+
+    #[test]
+    fn a_chain_is_split_by_number_where_it_grows_too_deep() {
+        for leaves in [1, 2, 9, 100, 100_000] {
+            let shape = Shape::collapse(&chain(leaves));
+            assert!(shape.levels.len() <= MAX_DEPTH, "{leaves}: {} levels", shape.levels.len());
+            let mut triangles: Vec<u32> =
+                shape.blocks.as_flattened().iter().copied().filter(|&t| t != NO_TRIANGLE).collect();
+            triangles.sort_unstable();
+            assert!(triangles.into_iter().eq(0..leaves), "{leaves}");
+        }
+    }
 }

@@ -1,5 +1,10 @@
 //! Bounding volume hierarchies and the canonical hit: a ray's hit is a function of the ray and the set of triangles
 //! alone, never of the tree.
+//!
+//! What a hit is stands in `slab` and `triangle`, written once over `lanes`; [`BruteForce`] applies it to one triangle
+//! after the other. A tree's shape comes from obvhs (`binary`), made eight wide (`collapse`); its boxes are fitted from
+//! below (`fit`). Rays go through it one by one (`traverse`) or sixteen at a time (`interval`, `packet`), and through
+//! objects that stand somewhere in the world (`placement`, `traced`).
 
 // Formulas over lanes must be inlined into the functions that enable the lanes' CPU feature, or they would be compiled
 // without it.

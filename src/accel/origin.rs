@@ -24,3 +24,22 @@ pub fn magnitude(corners: &[Vec3; 3]) -> Vec3 {
 pub fn offset_origin(p: Vec3, n: Vec3, magnitude: Vec3) -> Vec3 {
     p + n * (LEAVE * n.abs().dot(p.abs() + magnitude))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_offset_is_that_worked_out_on_paper() {
+        // along z: 32 · 2⁻²³ · (|3| + 5) = 2⁻¹⁸ · 8 = 2⁻¹⁵
+        let p = offset_origin(Vec3::new(1.0, 2.0, 3.0), Vec3::NEG_Z, Vec3::new(1.0, 2.0, 5.0));
+        assert_eq!(p, Vec3::new(1.0, 2.0, 3.0 - 1.0 / 32768.0));
+    }
+
+    #[test]
+    fn a_hit_point_is_the_combination_of_the_corners() {
+        let corners = [Vec3::ZERO, Vec3::new(4.0, 0.0, 8.0), Vec3::new(0.0, 2.0, -8.0)];
+        assert_eq!(hit_point(&corners, [0.25, 0.5]), Vec3::new(1.0, 1.0, -2.0));
+        assert_eq!(magnitude(&corners), Vec3::new(4.0, 2.0, 8.0));
+    }
+}

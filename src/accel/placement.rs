@@ -117,3 +117,72 @@ impl Placement {
 fn abs(m: &DMat3) -> DMat3 {
     DMat3::from_cols(m.x_axis.abs(), m.y_axis.abs(), m.z_axis.abs())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::accel::slab::SlabRay;
+    use crate::accel::triangle::ScalarRay;
+    use crate::math::DVec3;
+    use glam::DQuat;
+
+    /// Numbers in [-1, 1): the fractional parts of multiples of the golden ratio.
+    fn numbers() -> impl FnMut() -> f64 {
+        let mut n = 0.0_f64;
+        move || {
+            n += 1.0;
+            2.0 * (n * 0.618_033_988_749_894_9).fract() - 1.0
+        }
+    }
+
+    #[test]
+    fn the_box_in_the_world_is_entered_not_after_any_triangle() {
+        let mut next = numbers();
+        let mut hits = 0;
+        for i in 0..20_000 {
+            let size = [1.0, 1e-3, 1e4][i % 3];
+            let far = [0.0, 1.0, 1e5][i / 3 % 3];
+            let mut vector = |s: f64| DVec3::new(next() * s, next() * s, next() * s);
+            let corners = [vector(size), vector(size), vector(size)].map(|v| v.as_vec3().to_array());
+            let turn = DQuat::from_axis_angle(vector(1.0).normalize(), vector(3.0).x);
+            let m = DAffine3::from_scale_rotation_translation(vector(2.0), turn, vector(far));
+            let placement = Placement::new(&m, &Aabb::of_points(&corners));
+            // towards the triangle's middle, from near and far
+            let middle = corners.iter().map(|c| placement.point(*c)).sum::<Vec3>() / 3.0;
+            let origin = middle + vector([2.0, 300.0][i % 2] * size).as_vec3();
+            let ray = Ray { origin, direction: (middle - origin).normalize() };
+            let Some((distance, _)) = ScalarRay::new(&placement.object_ray(&ray)).hit(&corners) else {
+                continue;
+            };
+            hits += 1;
+            let entry = SlabRay::new(&ray).entry(&placement.box_for(&ray));
+            assert!(
+                entry.is_some_and(|e| e <= distance),
+                "{entry:?}, {distance}: {ray:?}, {m:?}, {corners:?}"
+            );
+        }
+        assert!(hits > 15_000, "{hits}");
+    }
+
+    #[test]
+    fn a_transform_without_inverse_is_never_entered() {
+        let b = Aabb { min: [-1.0; 3], max: [1.0; 3] };
+        for scale in [DVec3::ZERO, DVec3::new(1.0, 0.0, 1.0), DVec3::NAN, DVec3::splat(1e-60)] {
+            let placement = Placement::new(&DAffine3::from_scale(scale), &b);
+            let ray = Ray { origin: Vec3::ZERO, direction: Vec3::Z };
+            assert_eq!(SlabRay::new(&ray).entry(&placement.box_for(&ray)), None, "{scale}");
+        }
+    }
+
+    #[test]
+    fn a_point_is_turned_and_moved_and_its_magnitude_adds_up_without_signs() {
+        // a quarter turn about z: (x, y, z) -> (-y, x, z), then moved
+        let m = DAffine3::from_cols_array(&[0.0, 1.0, 0.0, -1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 10.0, -20.0, 30.0]);
+        let placement = Placement::new(&m, &Aabb { min: [0.0; 3], max: [1.0; 3] });
+        assert_eq!(placement.point([1.0, 2.0, -3.0]), Vec3::new(8.0, -19.0, 27.0));
+        assert_eq!(placement.magnitude([1.0, 2.0, -3.0]), Vec3::new(12.0, 21.0, 33.0));
+        let ray = placement
+            .object_ray(&Ray { origin: Vec3::new(8.0, -19.0, 27.0), direction: Vec3::new(0.0, 2.0, 0.0) });
+        assert_eq!((ray.origin, ray.direction), (Vec3::new(1.0, 2.0, -3.0), Vec3::new(2.0, 0.0, 0.0)));
+    }
+}

@@ -138,3 +138,45 @@ impl SlabRay<f32> {
         (entry <= exit).then_some(entry)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::Vec3;
+
+    #[test]
+    fn an_own_box_is_eight_ulp_of_the_largest_extent_and_a_float_larger() {
+        // extents 1, 0.5, 0: margin 8 · 2⁻²³ = 2⁻²⁰ on every axis
+        let b = Aabb::own(&[[0.0, 0.0, 2.0], [1.0, 0.0, 2.0], [0.0, 0.5, 2.0]]);
+        let m = 1.0 / 1048576.0_f32;
+        assert_eq!(b.min, [(-m).next_down(), (-m).next_down(), (2.0 - m).next_down()]);
+        assert_eq!(b.max, [(1.0 + m).next_up(), (0.5 + m).next_up(), (2.0 + m).next_up()]);
+    }
+
+    #[test]
+    fn next_up_is_that_of_the_standard_library() {
+        for bits in
+            (0..=u32::MAX).step_by(65_521).chain([0, 1 << 31, 0x7f7f_ffff, 0xff7f_ffff, 1, (1 << 31) + 1])
+        {
+            let x = f32::from_bits(bits);
+            let expected = if x.is_finite() { x.next_up() } else { x };
+            assert!(next_up(x) == expected || x.is_nan() && next_up(x).is_nan(), "{x:e}");
+        }
+    }
+
+    #[test]
+    fn a_ray_enters_and_leaves_where_it_meets_the_planes() {
+        // from (-1, 0.5, 0.5) along 2x: at x = 0 after 0.5, at x = 3 after 2
+        let ray = SlabRay::<f32>::new(&Ray {
+            origin: Vec3::new(-1.0, 0.5, 0.5),
+            direction: Vec3::new(2.0, 0.0, 0.0),
+        });
+        let b = Aabb { min: [0.0; 3], max: [3.0, 1.0, 1.0] };
+        let (near, far) = sides(&b, ray.near_side);
+        assert_eq!(ray.pass(near, far), (0.5, 2.0 * EXIT_FACTOR));
+        assert_eq!(ray.entry(&b), Some(0.5));
+        assert_eq!(ray.entry(&Aabb { min: [0.0, 0.6, 0.0], ..b }), None);
+        assert_eq!(ray.entry(&Aabb { min: [-2.0, 0.0, 0.0], ..b }), Some(0.0), "it starts inside");
+        assert_eq!(ray.entry(&Aabb::EMPTY), None);
+    }
+}

@@ -74,3 +74,22 @@ impl Stack {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_nearest_is_topmost_above_the_floor_and_what_is_too_far_is_dropped() {
+        let mut stack = Stack::new();
+        stack.insert(Waiting::new(0.5, 1), 0);
+        for (entry, child) in [(2.0, 2), (1.0, 3), (3.0, 4)] {
+            stack.insert(Waiting::new(entry, child), 1);
+        }
+        assert_eq!(stack.len(), 4);
+        assert_eq!(stack.pop_before(9.0), Some(3));
+        assert_eq!(stack.pop_before(2.0), Some(2));
+        assert_eq!(stack.pop_before(2.0), Some(1), "3.0 is dropped");
+        assert_eq!(stack.pop_before(2.0), None);
+    }
+}

@@ -51,7 +51,8 @@ impl TracedObject {
 /// An object, and its triangle that was found.
 type FoundIn = (usize, Found);
 
-/// Objects that rays are traced against. Primitives count through them in their order.
+/// Objects that rays are traced against. Primitives count through them in their order. Batches are taken sixteen rays
+/// at a time; fastest are sixteen that start near each other and go the same way, as through 4x4 pixels.
 #[derive(Clone, Debug)]
 pub struct TracedScene {
     objects: Vec<TracedObject>,

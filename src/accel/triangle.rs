@@ -4,6 +4,8 @@
 //! Watertight: a projected vertex is a function of ray and vertex alone, so neighbours see the same one; the two
 //! products of an edge's value are rounded monotonically, so its sign is right or the value is 0, and 0 counts for
 //! both neighbours, whose values are negatives of each other bit for bit (nothing is fused).
+//!
+//! Both sides of a triangle are hit, at distances above 0 only: a ray that starts in a plane does not hit it there.
 
 use super::lanes::{Lanes, per_axis};
 use super::slab::{Aabb, SlabRay};
@@ -137,10 +139,11 @@ impl Search {
         }
     }
 
-    /// Before a distance.
+    /// Before a distance; NaN is before all of them.
     #[inline(always)]
     pub(crate) fn until(end: f32) -> Self {
-        Self { before: HitOrder { distance: end, primitive: 0 }, ..Self::after(None) }
+        let distance = Lanes::max(end, f32::NEG_INFINITY);
+        Self { before: HitOrder { distance, primitive: 0 }, ..Self::after(None) }
     }
 
     /// Looks for nothing more.
@@ -190,4 +193,55 @@ impl ScalarRay {
 #[inline(always)]
 pub(crate) fn distance_in_plane(slab: &SlabRay<f32>, corners: &[[f32; 3]; 3], t: f32) -> Option<f32> {
     slab.entry(&Aabb::own(corners)).map(|entry| Lanes::max(t, entry))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::Vec3;
+
+    const CORNERS: [[f32; 3]; 3] = [[0.0, 0.0, 0.0], [4.0, 0.0, 0.0], [0.0, 4.0, 0.0]];
+
+    fn hit(x: f32, y: f32, direction: Vec3) -> Option<(f32, [f32; 2])> {
+        ScalarRay::new(&Ray { origin: Vec3::new(x, y, 2.0), direction }).hit(&CORNERS)
+    }
+
+    #[test]
+    fn distance_and_weights_are_those_worked_out_on_paper() {
+        // (1, 2) = 1/4 · (0, 0) + 1/4 · (4, 0) + 1/2 · (0, 4). The own box ends 4 · 2⁻²⁰ and a float above the plane, so
+        // it is entered before it, and the distance is the plane's.
+        assert_eq!(hit(1.0, 2.0, Vec3::NEG_Z), Some((2.0, [0.25, 0.5])));
+        assert_eq!(hit(1.0, 2.0, Vec3::NEG_Z * 4.0), Some((0.5, [0.25, 0.5])));
+        assert_eq!(hit(1.0, 2.0, Vec3::Z), None, "it is behind");
+        assert_eq!(hit(3.0, 2.0, Vec3::NEG_Z), None, "beside");
+        assert_eq!(hit(1.0, 2.0, Vec3::X), None, "parallel");
+    }
+
+    #[test]
+    fn edges_corners_and_both_sides_are_hit() {
+        for (x, y) in [(0.0, 0.0), (4.0, 0.0), (0.0, 4.0), (2.0, 2.0), (2.0, 0.0), (0.0, 1.0)] {
+            assert!(hit(x, y, Vec3::NEG_Z).is_some(), "{x} {y}");
+        }
+        let from_below = Ray { origin: Vec3::new(1.0, 2.0, -2.0), direction: Vec3::Z };
+        assert_eq!(ScalarRay::new(&from_below).hit(&CORNERS), Some((2.0, [0.25, 0.5])));
+    }
+
+    #[test]
+    fn neighbours_see_opposite_values_of_their_edge() {
+        let shear = ShearRay::<f32>::new(&Ray {
+            origin: Vec3::new(0.1, 0.7, 3.0),
+            direction: Vec3::new(0.3, -0.2, -1.0),
+        });
+        let [a, b, c, d] = [[0.13, 0.2, 0.7], [5.1, 0.3, 0.9], [0.2, 4.7, 0.11], [6.3, 5.9, 0.77]];
+        assert_eq!(shear.edges(a, b, c).values[0], -shear.edges(d, c, b).values[0]);
+    }
+
+    #[test]
+    fn collinear_coincident_and_broken_corners_have_no_area_and_tiny_ones_have() {
+        assert!(!has_area(&[[1.0, 1.0, 1.0], [2.0, 2.0, 2.0], [4.0, 4.0, 4.0]]));
+        assert!(!has_area(&[[1.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]));
+        assert!(!has_area(&[[f32::NAN, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]));
+        assert!(has_area(&[[0.0; 3], [1e-30, 0.0, 0.0], [0.0, 1e-30, 0.0]]));
+        assert!(has_area(&[[-3e38; 3], [3e38, 0.0, 0.0], [0.0, 3e38, 0.0]]));
+    }
 }

@@ -83,3 +83,29 @@ fn check_block(
     }
     Ok(())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::accel::Quality;
+
+    #[test]
+    fn what_is_wrong_is_found() {
+        let positions: Vec<[f32; 3]> =
+            (0..300_u32).map(|i| [i * 37 % 101, i * 53 % 103, i].map(|x| x as f32)).collect();
+        let triangles: Vec<[u32; 3]> = (0..100).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
+        let tree = Tree::build(&positions, &triangles, Quality::Fastest);
+        assert_eq!(validate(&tree, &positions, &triangles), Ok(()));
+        let wrong = |break_it: fn(&mut Tree)| {
+            let mut tree = tree.clone();
+            break_it(&mut tree);
+            validate(&tree, &positions, &triangles).is_err()
+        };
+        assert!(wrong(|t| t.nodes[0].planes[0][0][0] = 3.0));
+        assert!(wrong(|t| t.blocks[0].corners[0][0][0] += 1.0));
+        assert!(wrong(|t| t.blocks[0].triangles[0] = NO_TRIANGLE));
+        assert!(wrong(|t| t.nodes[1].children[0] = LEAF));
+        assert!(wrong(|t| t.levels.swap(0, 1)));
+        assert!(validate(&tree, &positions, &triangles[1..]).is_err());
+    }
+}

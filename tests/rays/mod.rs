@@ -46,7 +46,7 @@ pub fn place(p: Vec3, scale: f64, by: DVec3) -> Vec3 {
     (p.as_dvec3() * scale + by).as_vec3()
 }
 
-/// A small generator (SplitMix64, Steele et al. 2014).
+/// A small generator (`SplitMix64`, Steele et al. 2014).
 #[derive(Clone, Debug)]
 pub struct Random(pub u64);
 
@@ -150,7 +150,7 @@ pub fn sphere(cuts: usize) -> Mesh {
     mesh
 }
 
-/// An OBJ of the scenes that RENTIX_SCENES names; None, and a line, where it is not set.
+/// An OBJ of the scenes that `RENTIX_SCENES` names; None, and a line, where it is not set.
 pub fn load(path: &str) -> Option<Mesh> {
     let Some(folder) = std::env::var_os("RENTIX_SCENES") else {
         println!("skipped: RENTIX_SCENES is not set");
@@ -223,7 +223,7 @@ pub struct Reference {
 
 /// Where a ray meets the plane of a triangle, and whether inside it (Möller and Trumbore 1997, in f64).
 fn plane(ray: &Ray, corners: [Vec3; 3]) -> Option<(f64, bool)> {
-    let [a, b, c] = corners.map(|c| c.as_dvec3());
+    let [a, b, c] = corners.map(Vec3::as_dvec3);
     let (o, d) = (ray.origin.as_dvec3(), ray.direction.as_dvec3());
     let (e, f) = (b - a, c - a);
     let p = d.cross(f);
@@ -304,7 +304,7 @@ pub fn disagreement(
 }
 
 fn cosine(ray: &Ray, corners: [Vec3; 3]) -> f64 {
-    let [a, b, c] = corners.map(|c| c.as_dvec3());
+    let [a, b, c] = corners.map(Vec3::as_dvec3);
     (b - a).cross(c - a).normalize_or_zero().dot(ray.direction.as_dvec3().normalize()).abs()
 }
 
