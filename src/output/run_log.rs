@@ -176,7 +176,9 @@ mod tests {
         );
         live.append(&record(LOGS_MAX + 1)).unwrap();
         let live_ones: Vec<RunLog> = (0..LOGS_MAX).map(|_| RunLog::create(output.path())).collect();
-        live_ones.iter().for_each(|log| log.append(&record(0)).unwrap());
+        for log in &live_ones {
+            log.append(&record(0)).unwrap();
+        }
         fold_logs(output.path()).unwrap();
         assert_eq!(logs(&records_folder(output.path())).unwrap().len(), LOGS_MAX + 2, "live ones stay");
         assert_eq!(named(output.path(), LOGS_MAX + 2), LOGS_MAX + 2);
