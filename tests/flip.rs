@@ -98,9 +98,9 @@ impl Pair {
         let pixels = self.pixels(of);
         let channels = ["R", "G", "B"].into_iter().enumerate().map(|(c, name)| Channel {
             name: name.into(),
-            samples: Samples::Float(pixels.iter().map(|p| f32::from(p[c]) / 255.0).collect()),
+            samples: Samples::Share(pixels.iter().map(|p| u16::from(p[c]) * 257).collect()),
         });
-        Picture { size: self.size, linear: false, channels: channels.collect() }
+        Picture { size: self.size, channels: channels.collect() }
     }
 
     fn flip(&self) -> f64 {

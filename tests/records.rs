@@ -6,8 +6,8 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-fn file(path: &str, bytes: &[u8]) -> PictureFile {
-    PictureFile { path: path.into(), bytes: bytes.to_vec() }
+fn file(path: &str, bytes: impl Into<Vec<u8>>) -> PictureFile {
+    PictureFile { path: path.into(), bytes: bytes.into() }
 }
 
 fn finished(folder: &Path, picture: &str, fingerprint: u128) -> bool {
@@ -122,7 +122,7 @@ fn runs_beside_each_other_lose_nothing() {
                 for i in 0..8u128 {
                     let own = 1 + i + 8 * (2 * run as u128 + thread);
                     for n in [0, own] {
-                        let picture = file(&format!("{n}.png"), &[n as u8; 1000]);
+                        let picture = file(&format!("{n}.png"), [n as u8; 1000]);
                         finish(log, PartHash(n), &[picture]).unwrap();
                         clean_up(out, [Path::new("0.png")]).unwrap();
                     }
@@ -181,7 +181,7 @@ const CHILD_FOLDER: &str = "RENTIX_TEST_FULL_DISK";
 fn a_full_disk_leaves_no_torn_picture() {
     if let Some(out) = std::env::var_os(CHILD_FOLDER) {
         let log = RunLog::create(Path::new(&out));
-        let error = finish(&log, PartHash(1), &[file("big.png", &[7; 1 << 20])]).unwrap_err();
+        let error = finish(&log, PartHash(1), &[file("big.png", vec![7; 1 << 20])]).unwrap_err();
         assert!(error.to_string().contains("big.png: cannot be written"), "{error}");
         assert!(error.to_string().contains("free some space"), "{error}");
         finish(&log, PartHash(2), &[file("small.png", b"small")]).unwrap();

@@ -33,12 +33,12 @@ pub(super) fn unit(x: f32) -> f32 {
 
 /// A share in [0, 1] as an integer of 8 bits, rounded to nearest; no curve.
 pub fn unorm8(x: f32) -> u8 {
-    (f64::from(unit(x)) * 255.0).round() as u8
+    (f64::from(unit(x)) * 255.0 + 0.5) as u8
 }
 
 /// A share in [0, 1] as an integer of 16 bits, rounded to nearest; no curve.
 pub fn unorm16(x: f32) -> u16 {
-    (f64::from(unit(x)) * 65535.0).round() as u16
+    (f64::from(unit(x)) * 65535.0 + 0.5) as u16
 }
 
 /// Linear light as 16 bits on the sRGB curve: clamped, rounded to nearest.
@@ -112,10 +112,11 @@ fn least_with_code(code: u8) -> f32 {
     x
 }
 
-/// Linear light of each 8-bit code on the sRGB curve.
-pub fn linear_from_srgb8() -> &'static [f32; 256] {
-    static TABLE: LazyLock<[f32; 256]> =
-        LazyLock::new(|| std::array::from_fn(|code| linear_from_srgb(code as f64 / 255.0) as f32));
+/// Linear light of each 16-bit code on the sRGB curve.
+pub fn linear_from_srgb16() -> &'static [f32] {
+    static TABLE: LazyLock<Vec<f32>> = LazyLock::new(|| {
+        (0..=u16::MAX).map(|code| linear_from_srgb(f64::from(code) / 65535.0) as f32).collect()
+    });
     &TABLE
 }
 
@@ -142,8 +143,8 @@ mod tests {
 
     #[test]
     fn the_curve_and_its_inverse() {
-        for code in 0..=255u8 {
-            assert_eq!(Srgb8::table().code(linear_from_srgb8()[usize::from(code)]), code);
+        for code in 0..=u16::MAX {
+            assert_eq!(srgb16(linear_from_srgb16()[usize::from(code)]), code);
         }
         for i in 0..=1000 {
             let x = f64::from(i) / 1000.0;

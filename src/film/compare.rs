@@ -1,16 +1,15 @@
 //! How far two pictures are apart: greatest difference, RMSE, PSNR, mean FLIP.
 
-use super::color::linear_from_srgb;
+use super::color::linear_from_srgb16;
 use super::flip::mean_flip;
 use rayon::prelude::*;
+use std::borrow::Cow;
 
 /// A picture to compare: named channels, each one value a pixel, rows from the top.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Picture {
     /// Width and height in pixels.
     pub size: [u32; 2],
-    /// Whether colour is linear light; else it stands on the sRGB curve.
-    pub linear: bool,
     /// The channels in the file's order, named as in EXR: `R`, `depth.Z`.
     pub channels: Vec<Channel>,
 }
@@ -27,7 +26,9 @@ pub struct Channel {
 /// The values of a channel.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Samples {
-    /// Floats; integers of 8 and 16 bits as shares of the greatest one.
+    /// Shares of 1 in 65535ths (8 bits: v as 257 v, the same share); colour stands on the sRGB curve.
+    Share(Vec<u16>),
+    /// Floats; colour is linear light.
     Float(Vec<f32>),
     /// Numbers that name something, such as `id.part`.
     Id(Vec<u32>),
@@ -56,9 +57,9 @@ pub enum Mismatch {
     /// They have different channels.
     #[error("the channels differ: {} and {}", .0.join(" "), .1.join(" "))]
     Channels(Vec<String>, Vec<String>),
-    /// One holds linear light, the other stands on the sRGB curve.
-    #[error("one holds linear light, the other stands on the sRGB curve")]
-    Curve,
+    /// A channel holds other kinds of values.
+    #[error("channel {0} holds {1} and {2}")]
+    Samples(String, &'static str, &'static str),
 }
 
 /// Compares two pictures of equal size and channels.
@@ -69,9 +70,6 @@ pub fn compare(a: &Picture, b: &Picture) -> Result<Comparison, Mismatch> {
     if a.size != b.size {
         return Err(Mismatch::Size(a.size, b.size));
     }
-    if a.linear != b.linear {
-        return Err(Mismatch::Curve);
-    }
     let paired: Option<Vec<_>> = a.channels.iter().map(|c| Some((c, b.channel(&c.name)?))).collect();
     let Some(paired) = paired.filter(|p| p.len() == b.channels.len()) else {
         return Err(Mismatch::Channels(a.channel_names(), b.channel_names()));
@@ -79,9 +77,12 @@ pub fn compare(a: &Picture, b: &Picture) -> Result<Comparison, Mismatch> {
     let mut sums = Sums::default();
     for (a, b) in paired {
         match (&a.samples, &b.samples) {
-            (Samples::Float(a), Samples::Float(b)) => sums.add(a, b, difference),
+            (Samples::Share(a), Samples::Share(b)) => {
+                sums.add(a, b, |a, b| f64::from(a.abs_diff(b)) / 65535.0);
+            }
+            (Samples::Float(a), Samples::Float(b)) => sums.add(a, b, float_difference),
             (Samples::Id(a), Samples::Id(b)) => sums.add(a, b, |a, b| f64::from(u8::from(a != b))),
-            _ => return Err(Mismatch::Channels(vec![a.described()], vec![b.described()])),
+            (x, y) => return Err(Mismatch::Samples(a.name.clone(), x.kind(), y.kind())),
         }
     }
     let rmse = if sums.count == 0 { 0.0 } else { (sums.squares / sums.count as f64).sqrt() };
@@ -125,7 +126,7 @@ impl Sums {
 }
 
 /// The difference of two floats, at most 1; the same infinity or not-a-number on both sides is no difference.
-fn difference(a: f32, b: f32) -> f64 {
+fn float_difference(a: f32, b: f32) -> f64 {
     if a == b || a.to_bits() == b.to_bits() {
         return 0.0;
     }
@@ -137,6 +138,7 @@ impl Samples {
     /// How many they are.
     pub fn len(&self) -> usize {
         match self {
+            Self::Share(values) => values.len(),
             Self::Float(values) => values.len(),
             Self::Id(values) => values.len(),
         }
@@ -145,6 +147,26 @@ impl Samples {
     /// Whether there is none.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
+    }
+
+    /// Linear light; None where it is no light.
+    fn linear(&self) -> Option<Cow<'_, [f32]>> {
+        match self {
+            Self::Share(values) => {
+                let table = linear_from_srgb16();
+                Some(values.par_iter().map(|&v| table[usize::from(v)]).collect::<Vec<_>>().into())
+            }
+            Self::Float(values) => Some(values.into()),
+            Self::Id(_) => None,
+        }
+    }
+
+    fn kind(&self) -> &'static str {
+        match self {
+            Self::Share(_) => "values on the sRGB curve",
+            Self::Float(_) => "floats",
+            Self::Id(_) => "ids",
+        }
     }
 }
 
@@ -157,23 +179,9 @@ impl Picture {
         self.channels.iter().map(|c| c.name.clone()).collect()
     }
 
-    fn linear_rgb(&self) -> Option<Vec<[f32; 3]>> {
-        let floats = |name| match &self.channel(name)?.samples {
-            Samples::Float(values) => Some(values),
-            Samples::Id(_) => None,
-        };
-        let (r, g, b) = (floats("R")?, floats("G")?, floats("B")?);
-        let linear = |x: f32| if self.linear { x } else { linear_from_srgb(f64::from(x)) as f32 };
-        Some((r, g, b).into_par_iter().map(|(&r, &g, &b)| [r, g, b].map(linear)).collect())
-    }
-}
-
-impl Channel {
-    fn described(&self) -> String {
-        match self.samples {
-            Samples::Float(_) => format!("{} of floats", self.name),
-            Samples::Id(_) => format!("{} of integers", self.name),
-        }
+    fn linear_rgb(&self) -> Option<[Cow<'_, [f32]>; 3]> {
+        let [r, g, b] = ["R", "G", "B"].map(|name| self.channel(name)?.samples.linear());
+        Some([r?, g?, b?])
     }
 }
 
@@ -184,7 +192,6 @@ mod tests {
     fn picture(channels: &[(&str, &[f32])]) -> Picture {
         Picture {
             size: [2, 1],
-            linear: false,
             channels: channels
                 .iter()
                 .map(|(name, values)| Channel {
@@ -232,6 +239,10 @@ mod tests {
         assert_eq!(compare(&b, &a).unwrap_err().to_string(), "the channels differ: R A and R");
         let c = Picture { size: [1, 2], ..a.clone() };
         assert_eq!(compare(&a, &c).unwrap_err().to_string(), "the sizes differ: 2x1 and 1x2");
-        assert_eq!(compare(&a, &Picture { linear: true, ..a.clone() }), Err(Mismatch::Curve));
+        let coded = Channel { name: "R".into(), samples: Samples::Share(vec![0, 9]) };
+        assert_eq!(
+            compare(&a, &Picture { channels: vec![coded], ..a.clone() }).unwrap_err().to_string(),
+            "channel R holds floats and values on the sRGB curve"
+        );
     }
 }

@@ -25,12 +25,11 @@ fn interleave<T>(
     let Some(alpha) = alpha else {
         return rgb.as_flattened().iter().map(|&x| color(x * gain)).collect();
     };
-    let mut samples = Vec::with_capacity(4 * rgb.len());
-    for (&rgb, &a) in rgb.iter().zip(alpha) {
+    let pixel = |(&rgb, &a): (&[f32; 3], &f32)| {
         let [r, g, b] = straight(rgb, a).map(|x| color(x * gain));
-        samples.extend([r, g, b, share(a)]);
-    }
-    samples
+        [r, g, b, share(a)]
+    };
+    rgb.iter().zip(alpha).map(pixel).collect::<Vec<[T; 4]>>().into_flattened()
 }
 
 /// Premultiplied colour without its alpha; black where there is none.

@@ -125,6 +125,7 @@ mod tests {
     }
 
     #[test]
+    #[cfg(target_os = "linux")]
     fn temporaries_of_dead_runs_are_removed() {
         let folder = tempfile::tempdir().unwrap();
         let file = |name: &str| {

@@ -131,6 +131,9 @@ pub fn picture_files(
 ) -> Result<Vec<PictureFile>, OutputError> {
     let line = encoding.format.line();
     let refused = |format| move |why| OutputError::Encode { format, size: film.size, why };
+    if film.rgb.is_empty() {
+        return Err(refused(line.word)("it has no pixels".into()));
+    }
     let bytes = (line.encode)(film, encoding).map_err(refused(line.word))?;
     let mut files = vec![PictureFile { path: picture.to_path_buf(), bytes }];
     if encoding.format != Format::Exr && film.aovs.any() {

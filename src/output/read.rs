@@ -52,13 +52,13 @@ fn decode_integers(bytes: &[u8]) -> Result<Picture, String> {
     } else {
         shares(&["R", "G", "B"], decoded.into_rgb16().as_raw())
     };
-    Ok(Picture { size, linear: false, channels })
+    Ok(Picture { size, channels })
 }
 
 fn shares(names: &[&str], interleaved: &[u16]) -> Vec<Channel> {
     let channel = |(i, name): (usize, &&str)| {
-        let values = interleaved.iter().skip(i).step_by(names.len()).map(|&x| f32::from(x) / 65535.0);
-        Channel { name: (*name).to_string(), samples: Samples::Float(values.collect()) }
+        let values = interleaved.iter().skip(i).step_by(names.len()).copied();
+        Channel { name: (*name).to_string(), samples: Samples::Share(values.collect()) }
     };
     names.iter().enumerate().map(channel).collect()
 }
@@ -101,5 +101,5 @@ fn decode_exr(bytes: &[u8]) -> Result<Picture, String> {
     if let Some(coarse) = channels.iter().find(|c| c.samples.len() != size.area()) {
         return Err(format!("its channel {} has not one value a pixel", coarse.name));
     }
-    Ok(Picture { size: [size.0 as u32, size.1 as u32], linear: true, channels })
+    Ok(Picture { size: [size.0 as u32, size.1 as u32], channels })
 }

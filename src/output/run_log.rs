@@ -69,6 +69,9 @@ pub(super) fn fold_logs(folder: &Path) -> Result<(), OutputError> {
         return Ok(());
     }
     let dead: Vec<&PathBuf> = logs.iter().filter(|log| is_dead(log, "", LOG_SUFFIX)).collect();
+    if dead.len() < 2 {
+        return Ok(());
+    }
     let mut lines = BTreeSet::new();
     for log in &dead {
         lines.extend(log_lines(log)?);
@@ -172,6 +175,12 @@ mod tests {
             "the live run's and the folded one"
         );
         live.append(&record(LOGS_MAX + 1)).unwrap();
+        let live_ones: Vec<RunLog> = (0..LOGS_MAX).map(|_| RunLog::create(output.path())).collect();
+        for log in &live_ones {
+            log.append(&record(0)).unwrap();
+        }
+        fold_logs(output.path()).unwrap();
+        assert_eq!(logs(&records_folder(output.path())).unwrap().len(), LOGS_MAX + 2, "live ones stay");
         assert_eq!(named(output.path(), LOGS_MAX + 2), LOGS_MAX + 2);
     }
 
