@@ -57,14 +57,14 @@ fn a_bad_frame_is_named_and_fails_alone() {
 fn events_are_one_json_object_a_line() {
     let t = tempfile::tempdir().unwrap();
     let t = t.path();
-    let input = wave(&t.join("w"), 2, 4, 6);
+    let input = wave(&t.join("w"), 2, 4, 7);
     let said = render(t, &input, "out", &["--size", "32x18", "--json"], 0).stdout;
     let events: Vec<serde_json::Value> = said.lines().map(|l| serde_json::from_str(l).unwrap()).collect();
     let kinds: Vec<&str> = events.iter().map(|e| e["event"].as_str().unwrap()).collect();
     assert_eq!(kinds, ["start", "frame", "frame", "end"]);
     let frame = &events[1];
     assert_eq!(frame["rays"]["camera"], 32 * 18);
-    assert_eq!(frame["triangles"], 2 * 4 * 6 + 2);
+    assert_eq!(frame["triangles"], 2 * 4 * 7 + 2);
     assert_eq!(frame["change"]["added"], 1);
     assert_eq!(events[2]["change"]["deformed"], 1, "{}", events[2]);
 }
