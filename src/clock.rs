@@ -28,6 +28,9 @@ impl Stopwatch {
     }
 }
 
+/// When a file was changed, as the system tells it.
+pub type FileTime = SystemTime;
+
 /// Nanoseconds since the Unix epoch; 0 where the system's clock stands before it.
 pub fn unix_ns() -> u128 {
     SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).map_or(0, |d| d.as_nanos())

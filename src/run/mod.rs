@@ -12,7 +12,6 @@ mod source;
 mod trace;
 mod write;
 
-
 pub use event::{Event, FrameReport, Status};
 pub use read::read_frame;
 pub use report::{DeviceReport, Report, Totals};

@@ -1,13 +1,13 @@
 //! Loaded files of a run: what stands in more than one picture is parsed once.
 
+use crate::clock::FileTime;
 use crate::format::{self, FormatError, Loaded, ReadOptions};
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
-use std::time::SystemTime;
 
 /// A file's state as the system tells it: size and time of change.
-type Stamp = (u64, Option<SystemTime>);
+type Stamp = (u64, Option<FileTime>);
 
 struct Kept {
     stamp: Stamp,
