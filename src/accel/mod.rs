@@ -1,6 +1,38 @@
 //! Bounding volume hierarchies and the canonical hit: a ray's hit is a function of the ray and the set of triangles
 //! alone, never of the tree.
 
+// Formulas over lanes must be inlined into the functions that enable the lanes' CPU feature, or they would be compiled
+// without it.
+#![allow(clippy::inline_always)]
+
+mod binary;
+mod brute;
+mod collapse;
+mod fit;
+mod interval;
+mod lanes;
+mod origin;
+mod packet;
+mod placement;
+mod slab;
+mod stack;
+mod traced;
+mod traverse;
+mod tree;
+mod triangle;
+mod validate;
+
+pub use binary::Quality;
+pub use brute::BruteForce;
+pub use lanes::Width;
+pub use origin::{hit_point, magnitude, offset_origin};
+pub use placement::Placement;
+pub use slab::Aabb;
+pub use traced::{TracedObject, TracedScene};
+pub use tree::{Tree, TreeCounts};
+pub use triangle::has_area;
+pub use validate::validate;
+
 use crate::math::Vec3;
 
 /// A ray; the direction need not be unit. Distances are in units of its length.

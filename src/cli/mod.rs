@@ -1,6 +1,117 @@
 //! What was typed, what it means, a call below; the only room that prints.
 
+mod compare;
+mod completions;
+mod devices;
+mod inspect;
+mod progress;
+mod render;
+mod render_args;
+mod request;
+mod size;
+mod stop;
+
+use clap::{Args, Parser, Subcommand, ValueEnum};
+use std::process::ExitCode;
+
+/// Something was asked for that is not there now (also: pictures differ).
+const EXIT_FAILED: u8 = 1;
+/// Nothing was tried: wrong use, unreadable input, unwritable output, no such device.
+const EXIT_USE: u8 = 2;
+/// No device could do it; another machine may.
+const EXIT_NO_DEVICE: u8 = 3;
+
+/// Renders animation sequences (folders of OBJ frames) to pictures by ray tracing, headless.
+#[derive(Parser, Debug)]
+#[command(
+    name = "rentix",
+    version,
+    propagate_version = true,
+    args_override_self = true,
+    max_term_width = 100
+)]
+#[command(
+    after_help = "Example: rentix render walk/ -o out/walk --size fullhd\n\nExit status: 0 all is there, 1 some frames failed, 2 nothing was tried, 3 no device could do it, 130/143 stopped."
+)]
+pub struct Cli {
+    #[command(flatten)]
+    global: Global,
+    #[command(subcommand)]
+    command: Command,
+}
+
+/// Options that every command takes.
+#[derive(Args, Debug, Clone)]
+pub struct Global {
+    /// Say less: errors only
+    #[arg(short, long, global = true)]
+    quiet: bool,
+    /// Say more
+    #[arg(short, long, global = true)]
+    verbose: bool,
+    /// One JSON object a line on stdout
+    #[arg(long, global = true)]
+    json: bool,
+    /// Colours on a terminal
+    #[arg(long, global = true, value_name = "WHEN", default_value = "auto")]
+    color: Color,
+}
+
+/// When to use colours.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum Color {
+    Auto,
+    Always,
+    Never,
+}
+
+#[derive(Subcommand, Debug)]
+enum Command {
+    /// Renders sequences to pictures
+    #[command(
+        after_help = "Examples:\n  rentix render walk/\n  rentix render 'walk/walk_####.obj' --frames 1-100x2 --size 1920x1080 --samples 16 -o out\n  rentix render job.yaml"
+    )]
+    Render(Box<render_args::RenderArgs>),
+    /// Tells what is in a sequence and what changes from frame to frame; renders nothing
+    #[command(after_help = "Example: rentix inspect walk/")]
+    Inspect(Box<render_args::RenderArgs>),
+    /// Compares two pictures or two folders of pictures
+    #[command(
+        after_help = "Example: rentix compare out/a out/b --flip 0.005\n\nExit status: 0 equal (or within --flip), 1 they differ, 2 unreadable."
+    )]
+    Compare(compare::CompareArgs),
+    /// Lists what can render
+    #[command(after_help = "Example: rentix devices --json")]
+    Devices,
+    /// Prints a completion script for a shell
+    #[command(
+        after_help = "Example: rentix completions bash > ~/.local/share/bash-completion/completions/rentix"
+    )]
+    Completions {
+        /// Which shell
+        shell: clap_complete::Shell,
+    },
+}
+
 /// Runs the program; the exit status is CONTRACT 1's.
-pub fn main() -> std::process::ExitCode {
-    std::process::ExitCode::SUCCESS
+pub fn main() -> ExitCode {
+    let cli = match Cli::try_parse() {
+        Ok(cli) => cli,
+        Err(error) => {
+            // a closed pipe is no reason to fail
+            let _ = error.print();
+            return if error.use_stderr() { ExitCode::from(EXIT_USE) } else { ExitCode::SUCCESS };
+        }
+    };
+    let ended = match &cli.command {
+        Command::Render(args) => render::render(args, &cli.global),
+        Command::Inspect(args) => inspect::inspect(args, &cli.global),
+        Command::Compare(args) => compare::compare(args, &cli.global),
+        Command::Devices => devices::devices(&cli.global),
+        Command::Completions { shell } => Ok(completions::completions(*shell)),
+    };
+    ended.unwrap_or_else(|error| {
+        eprintln!("error: {error:#}");
+        ExitCode::from(EXIT_USE)
+    })
 }

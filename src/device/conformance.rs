@@ -1,1 +1,250 @@
-//! To be written.
+//! What every device must do, as checks over the trait: the CPU, each GPU and the fake device pass the same ones.
+//!
+//! The checks are assertions: they panic, naming what is wrong, where a device does not conform.
+
+use super::{Device, DeviceError, Stop};
+use crate::film::Film;
+use crate::math::{DAffine3, DVec3, Vec3};
+use crate::plan::{Action, plan_frame};
+use crate::scene::{
+    Aov, AovSet, Camera, Faces, Falloff, Filter, Frame, Geometry, Light, Material, MaterialRuns, Mesh,
+    Object, Part, Positions, Shot, Triangles,
+};
+use std::sync::Arc;
+
+/// Gives a fresh device that may hold so many bytes.
+pub type Make<'a> = &'a mut dyn FnMut(u64) -> Box<dyn Device>;
+
+/// More than the frames of these checks need.
+const AMPLE_BYTES: u64 = 1 << 24;
+
+/// Runs all checks.
+pub fn check(make: Make) {
+    a_warm_picture_is_the_cold_one(make);
+    what_is_resident_is_not_uploaded(make);
+    residency_adds_up(make);
+    a_cold_plan_forgets_everything(make);
+    what_does_not_fit_is_refused(make);
+    a_frame_without_objects_is_background(make);
+    a_stopped_trace_says_so(make);
+    a_frame_that_is_not_resident_is_refused(make);
+}
+
+/// Two devices that promise the same bytes draw the same pictures.
+pub fn check_same_pictures(a: &mut dyn Device, b: &mut dyn Device) {
+    for (i, frame) in frames().iter().enumerate() {
+        assert!(picture(a, frame) == picture(b, frame), "frame {i}: two devices' pictures differ");
+    }
+}
+
+/// A picture is the same whatever the device held before, in whatever order frames come.
+fn a_warm_picture_is_the_cold_one(make: Make) {
+    let frames = frames();
+    let cold: Vec<Film> = frames.iter().map(|f| picture(&mut *make(AMPLE_BYTES), f)).collect();
+    let mut device = make(AMPLE_BYTES);
+    for i in [0, 1, 2, 3, 3, 2, 1, 0, 2, 0, 3, 1] {
+        assert!(picture(&mut *device, &frames[i]) == cold[i], "frame {i}: warm and cold differ");
+    }
+}
+
+fn what_is_resident_is_not_uploaded(make: Make) {
+    let frames = frames();
+    let mut device = make(AMPLE_BYTES);
+    for frame in &frames {
+        let plan = plan_frame(frame, device.residency(), false);
+        let cost = device.apply(&plan, frame).expect("the budget is ample");
+        assert!(cost.uploaded_bytes > 0, "a part that was not there was not uploaded");
+        let plan = plan_frame(frame, device.residency(), false);
+        assert_eq!(plan.action, Action::None, "what was made resident is planned again");
+        let cost = device.apply(&plan, frame).expect("the budget is ample");
+        assert_eq!(cost.uploaded_bytes, 0, "a resident part was uploaded again");
+    }
+}
+
+/// What is held is what the frame is made of; its bytes, their peak, hits and misses are counted.
+fn residency_adds_up(make: Make) {
+    let mut device = make(AMPLE_BYTES);
+    let mut peak = 0;
+    for frame in &frames() {
+        let before = device.residency().clone();
+        let plan = plan_frame(frame, device.residency(), false);
+        let cost = device.apply(&plan, frame).expect("the budget is ample");
+        let after = device.residency();
+        let mut parts: Vec<_> = frame.objects.iter().flat_map(|o| o.geometry.parts()).collect();
+        parts.sort_unstable();
+        parts.dedup();
+        let trees: Vec<_> = frame.objects.iter().map(|o| crate::plan::tree_name(&o.geometry)).collect();
+        for (name, bytes) in &parts {
+            assert_eq!(after.held.get(name), Some(bytes), "a part is not held with its bytes");
+        }
+        let strangers =
+            after.held.keys().filter(|n| !trees.contains(n) && !parts.iter().any(|(p, _)| p == *n));
+        assert_eq!(strangers.count(), 0, "something is held that the frame does not use");
+        let uploaded: u64 = parts.iter().filter(|(n, _)| !before.held.contains_key(n)).map(|(_, b)| b).sum();
+        assert_eq!(
+            cost.uploaded_bytes, uploaded,
+            "uploaded bytes are not those of the parts that were not there"
+        );
+        let kept = after.held.keys().filter(|n| before.held.contains_key(n)).count() as u64;
+        assert_eq!(after.hits - before.hits, kept, "hits");
+        assert_eq!(after.misses - before.misses, after.held.len() as u64 - kept, "misses");
+        peak = after.bytes().max(peak);
+        assert!((peak..=device.info().budget_bytes).contains(&after.peak_bytes), "the peak is out of bounds");
+    }
+    let frame = Frame::default();
+    let plan = plan_frame(&frame, device.residency(), false);
+    device.apply(&plan, &frame).expect("nothing fits");
+    assert!(device.residency().held.is_empty(), "something is held for a frame without objects");
+}
+
+fn a_cold_plan_forgets_everything(make: Make) {
+    let frames = frames();
+    let frame = &frames[0];
+    let mut device = make(AMPLE_BYTES);
+    let warm = picture(&mut *device, frame);
+    let plan = plan_frame(frame, device.residency(), true);
+    assert_eq!(plan.action, Action::Load);
+    let cost = device.apply(&plan, frame).expect("the budget is ample");
+    let bytes: u64 = frame.objects[0].geometry.parts().iter().map(|(_, bytes)| bytes).sum();
+    assert_eq!(cost.uploaded_bytes, bytes, "a cold plan uploads all");
+    let cold = device.trace(frame, &shot(), &Stop::default()).expect("it is resident");
+    assert!(cold.film == warm, "the cold picture differs");
+}
+
+/// Refused with the figures, and nothing changes: the device goes on with what fits.
+fn what_does_not_fit_is_refused(make: Make) {
+    let frames = frames();
+    let (small, large) = (&frames[0], &frames[3]);
+    let mut ample = make(AMPLE_BYTES);
+    let small_picture = picture(&mut *ample, small);
+    let budget = ample.residency().bytes() * 2;
+    let mut device = make(budget);
+    assert!(picture(&mut *device, small) == small_picture);
+    let held = device.residency().clone();
+    let plan = plan_frame(large, device.residency(), false);
+    match device.apply(&plan, large) {
+        Err(DeviceError::OutOfMemory { needed_bytes, budget_bytes, .. }) => {
+            assert_eq!(budget_bytes, budget);
+            assert!(needed_bytes > budget, "{needed_bytes} bytes would fit {budget}");
+        }
+        other => panic!("a frame beyond the budget is not refused: {other:?}"),
+    }
+    assert!(*device.residency() == held, "a refused plan changed what is held");
+    assert!(picture(&mut *device, small) == small_picture, "after a refusal the device is not as before");
+}
+
+fn a_frame_without_objects_is_background(make: Make) {
+    let film = picture(&mut *make(AMPLE_BYTES), &Frame::default());
+    let background: [f32; 3] = shot().background.into();
+    assert!(film.rgb.iter().all(|p| *p == background), "an empty frame does not show the background");
+    assert!(film.aovs.id.is_none_or(|ids| ids.iter().all(|id| *id == [u32::MAX; 2])));
+}
+
+fn a_stopped_trace_says_so(make: Make) {
+    let frames = frames();
+    let mut device = make(AMPLE_BYTES);
+    let film = picture(&mut *device, &frames[1]);
+    let stop = Stop::default();
+    stop.ask();
+    assert_eq!(device.trace(&frames[1], &shot(), &stop).err(), Some(DeviceError::Stopped));
+    assert!(picture(&mut *device, &frames[1]) == film, "after a stop the picture differs");
+}
+
+fn a_frame_that_is_not_resident_is_refused(make: Make) {
+    let frames = frames();
+    let refused = make(AMPLE_BYTES).trace(&frames[0], &shot(), &Stop::default());
+    assert!(
+        matches!(refused, Err(DeviceError::NotResident { object: 0, .. })),
+        "traced without being resident"
+    );
+}
+
+/// Plans, applies and traces a frame.
+fn picture(device: &mut dyn Device, frame: &Frame) -> Film {
+    let plan = plan_frame(frame, device.residency(), false);
+    device.apply(&plan, frame).expect("the budget suffices");
+    device.trace(frame, &shot(), &Stop::default()).expect("it is resident").film
+}
+
+/// A picture of odd size with several samples, all auxiliary pictures, and lights of each kind.
+pub(super) fn shot() -> Shot {
+    let mut aovs = AovSet::default();
+    for aov in Aov::ALL {
+        aovs.insert(aov);
+    }
+    let color = Vec3::new(1.0, 0.9, 0.8);
+    let falloff = Falloff::InverseSquare;
+    Shot {
+        camera: Camera {
+            eye: DVec3::new(0.4, 0.9, 4.0),
+            look_at: DVec3::new(0.0, 0.1, 0.0),
+            up: DVec3::Y,
+            fov_deg: 40.0,
+        },
+        lights: vec![
+            Light::Point { position: Vec3::new(1.0, 3.0, 2.0), color, intensity: 6.0, falloff },
+            Light::Directional { direction: Vec3::new(0.3, -1.0, -0.5), color, intensity: 0.4 },
+            Light::Spot {
+                position: Vec3::new(-2.0, 2.0, 2.0),
+                direction: Vec3::new(1.0, -1.0, -1.0),
+                inner_deg: 10.0,
+                outer_deg: 30.0,
+                color,
+                intensity: 0.5,
+                falloff: Falloff::None,
+            },
+        ],
+        ambient: Vec3::new(0.3, 0.2, 0.1),
+        background: Vec3::new(0.1, 0.2, 0.4),
+        size: [75, 43],
+        samples: 3,
+        filter: Filter::Gaussian,
+        depth: 10,
+        seed: 7,
+        prune: 1.0 / 4096.0,
+        alpha: false,
+        aovs,
+    }
+}
+
+/// A wavy sheet; the same, deformed; the first with another material, in two places; a finer one.
+fn frames() -> [Frame; 4] {
+    let matt = Material { ka: [0.5; 3], ..Material::default() };
+    let glossy = Material { ks: [0.5; 3], ns: 20.0, d: 0.6, illum: 2, ..Material::default() };
+    let still = Object { geometry: sheet(12, 0.0, &matt), transform: None };
+    let moved = Object {
+        geometry: sheet(12, 0.0, &glossy),
+        transform: Some(
+            DAffine3::from_translation(DVec3::new(0.2, 0.4, 0.3))
+                * DAffine3::from_scale(DVec3::new(-0.6, 0.5, 0.6)),
+        ),
+    };
+    let deformed = Object { geometry: sheet(12, 1.0, &matt), transform: None };
+    let fine = Object { geometry: sheet(40, 0.0, &matt), transform: None };
+    [vec![still.clone()], vec![deformed], vec![still, moved], vec![fine]].map(|objects| Frame { objects })
+}
+
+/// A sheet of n × n squares over [−1, 1]² that waves in z with the given phase.
+fn sheet(n: u32, phase: f32, material: &Material) -> Arc<Geometry> {
+    let at = |i: u32| 2.0 * i as f32 / n as f32 - 1.0;
+    let wave = |x: f32, y: f32| 0.3 * libm::sinf(3.0 * x + phase) * libm::cosf(4.0 * y);
+    let positions = (0..=n).flat_map(|j| (0..=n).map(move |i| [at(i), at(j), wave(at(i), at(j))])).collect();
+    let corners = move |i: u32, j: u32| {
+        let first = j * (n + 1) + i;
+        [first, first + 1, first + n + 2, first + n + 1]
+    };
+    let squares: Vec<[u32; 4]> = (0..n).flat_map(|j| (0..n).map(move |i| corners(i, j))).collect();
+    Arc::new(Geometry {
+        positions: Part::new(Positions(positions)),
+        faces: Part::new(Faces { counts: vec![4; squares.len()], corners: squares.concat() }),
+        triangles: Part::new(Triangles(
+            squares.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]).collect(),
+        )),
+        texcoords: None,
+        normals: None,
+        colors: None,
+        material_runs: Part::new(MaterialRuns(vec![[0, 0]])),
+        materials: vec![Part::new(material.clone())],
+        meshes: vec![Mesh { first_face: 0, face_count: n * n, first_triangle: 0, triangle_count: 2 * n * n }],
+    })
+}

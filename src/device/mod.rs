@@ -5,6 +5,8 @@ pub mod conformance;
 pub mod cpu;
 pub mod fake;
 
+pub use crate::kernel::RayCounts;
+
 use crate::film::Film;
 use crate::plan::{Residency, UpdatePlan};
 use crate::scene::{Frame, Shot};
@@ -60,19 +62,6 @@ impl Stop {
     }
 }
 
-/// Rays traced for one frame.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct RayCounts {
-    /// Through pixels.
-    pub camera: u64,
-    /// To lights.
-    pub shadow: u64,
-    /// Mirrored.
-    pub mirrored: u64,
-    /// Refracted.
-    pub refracted: u64,
-}
-
 /// What applying a plan cost. A term that a device does not have is None.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct UpdateCost {
@@ -119,6 +108,14 @@ pub enum DeviceError {
         device: String,
         /// What is known.
         why: String,
+    },
+    /// The frame was not made resident before it was traced.
+    #[error("{device}: object {object} of the frame is not resident; its plan must be applied first")]
+    NotResident {
+        /// Which device.
+        device: String,
+        /// The object, by its place in the frame.
+        object: usize,
     },
     /// [`Stop`] was asked.
     #[error("stopped")]

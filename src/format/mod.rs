@@ -1,1 +1,109 @@
-//! To be written.
+//! Bytes to values with diagnostics: OBJ and MTL. The only room that reads scenes.
+
+mod error;
+mod lookup;
+mod material;
+mod mtl;
+mod number;
+mod obj;
+mod text;
+
+use crate::clock::Stopwatch;
+use crate::math::Bounds;
+use crate::scene::Geometry;
+use crate::warning::Warnings;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+pub use error::FormatError;
+pub use material::Library;
+pub use mtl::is_mtl_word;
+pub use obj::{Parsed, parse_obj};
+use text::Text;
+
+/// How files are read.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct ReadOptions {
+    /// Whether faces that cannot be rendered are dropped with a warning, where they would fail their frame.
+    pub lenient: bool,
+    /// Normals are smoothed over triangles within this angle, degrees, where the file gives none; None: within
+    /// smoothing groups.
+    pub smooth_angle_deg: Option<f32>,
+    /// Whether the colours in an MTL are sRGB; else they are linear.
+    pub mtl_srgb: bool,
+    /// An MTL whose materials replace those of the same name.
+    pub materials_file: Option<PathBuf>,
+    /// Statements that replace those of the materials named; applied last.
+    pub material_overrides: Vec<MaterialOverride>,
+}
+
+/// Statements for one material.
+#[derive(Clone, Debug, PartialEq)]
+pub struct MaterialOverride {
+    /// The material's name.
+    pub name: Vec<u8>,
+    /// Words of an MTL and what stands behind them.
+    pub words: Vec<(String, String)>,
+}
+
+/// An OBJ with all that it refers to.
+#[derive(Clone, Debug)]
+pub struct Loaded {
+    /// Shape and materials.
+    pub geometry: Arc<Geometry>,
+    /// Every file that was read: OBJ, MTL, maps.
+    pub inputs: Vec<PathBuf>,
+    /// For each slot of [`Geometry::materials`] the first name under which it was used.
+    pub material_names: Vec<Vec<u8>>,
+    /// Bytes of all inputs.
+    pub bytes_read: u64,
+    /// Time to read the OBJ, milliseconds.
+    pub read_ms: f64,
+    /// Time for everything else, milliseconds: parsing, materials, triangles, hashes.
+    pub parse_ms: f64,
+    /// What is wrong but does not stop the frame.
+    pub warnings: Warnings,
+    /// Libraries and maps that were named and not found, each as a sentence.
+    pub missing: Vec<String>,
+}
+
+/// Reads an OBJ and all that it refers to.
+pub fn load_obj(path: &Path, options: &ReadOptions) -> Result<Loaded, FormatError> {
+    let watch = Stopwatch::start();
+    let bytes = text::read(path)?;
+    let read_ms = watch.ms();
+    let watch = Stopwatch::start();
+    let text = Text::new(&bytes, path)?;
+    let mut warnings = Warnings::default();
+    let lines = obj::Lines::new(&text, path, options.lenient, &mut warnings)?;
+    let mut loader = material::Loader::new(path, options);
+    let library = loader.library(lines.libraries(), lines.used_materials(), &mut warnings)?;
+    let parsed = lines.into_parsed(&library, options, &mut warnings);
+    let inputs = std::iter::once(path.to_path_buf()).chain(loader.inputs).collect();
+    Ok(Loaded {
+        geometry: Arc::new(parsed.geometry),
+        inputs,
+        material_names: parsed.material_names,
+        bytes_read: bytes.len() as u64 + loader.bytes_read,
+        read_ms,
+        parse_ms: watch.ms(),
+        warnings,
+        missing: loader.missing,
+    })
+}
+
+/// The box of the positions in an OBJ that are finite, as [`load_obj`] gives them; empty where there is none.
+pub fn scan_bounds(path: &Path) -> Result<Bounds, FormatError> {
+    let bytes = text::read(path)?;
+    Ok(obj::bounds(&Text::new(&bytes, path)?))
+}
+
+/// The libraries that an OBJ names and the maps of all their materials, as far as they are there. The shape is not
+/// read, and what cannot be read names nothing: this is for what must not be written over.
+pub fn named_files(path: &Path, materials_file: Option<&Path>) -> Vec<PathBuf> {
+    let Ok(bytes) = text::read(path) else { return Vec::new() };
+    let Ok(text) = Text::new(&bytes, path) else { return Vec::new() };
+    let options =
+        ReadOptions { materials_file: materials_file.map(Path::to_path_buf), ..ReadOptions::default() };
+    material::Loader::new(path, &options).named_files(&obj::library_statements(&text))
+}

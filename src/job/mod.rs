@@ -1,1 +1,193 @@
-//! To be written.
+//! What is to be rendered: INPUT, frame numbers, job file, layers, cameras and transforms over time.
+
+pub mod auto;
+mod discover;
+mod file;
+mod names;
+pub mod numbers;
+pub mod options;
+mod resolve;
+pub mod settings;
+mod template;
+pub mod track;
+
+pub use discover::FrameFile;
+pub use file::Outside;
+pub use numbers::{Chunk, FrameSet, Order};
+pub use options::{CameraChoice, LightChoice, Options};
+pub use resolve::resolve;
+pub use settings::Settings;
+
+use crate::math::DAffine3;
+use crate::warning::Warnings;
+use std::io;
+use std::path::PathBuf;
+use std::sync::Arc;
+use track::Placed;
+
+/// What was asked for.
+#[derive(Clone, Debug, Default)]
+pub struct Request {
+    /// INPUTs, job files among them.
+    pub inputs: Vec<PathBuf>,
+    /// A job file given by `--job`.
+    pub job_file: Option<PathBuf>,
+    /// Options of the command line; they win.
+    pub options: Options,
+    /// `--frames`.
+    pub frames: Option<FrameSet>,
+    /// `--chunk`.
+    pub chunk: Option<Chunk>,
+    /// `--order`.
+    pub order: Order,
+    /// `--one-sequence`.
+    pub one_sequence: bool,
+    /// `--strict`.
+    pub strict: bool,
+    /// `-o`.
+    pub folder: Option<PathBuf>,
+}
+
+/// What is to be rendered.
+#[derive(Clone, Debug)]
+pub struct Job {
+    /// Its name.
+    pub name: String,
+    /// Where pictures go.
+    pub folder: PathBuf,
+    /// The sequences that there are.
+    pub sequences: Vec<Sequence>,
+    /// The pictures that were chosen, in the order in which they are to be taken.
+    pub pictures: Vec<Picture>,
+    /// Files that are read, as far as they are known before a frame is: job files, OBJs, layers' MTLs.
+    pub inputs: Vec<PathBuf>,
+    /// What is wrong but stops nothing.
+    pub warnings: Warnings,
+}
+
+/// One sequence of pictures.
+#[derive(Clone, Debug)]
+pub struct Sequence {
+    /// Its name.
+    pub name: String,
+    /// Its layers, at least one.
+    pub layers: Vec<Layer>,
+    /// Its first picture, chosen or not: where the auto light stands follows from it.
+    pub first: Picture,
+}
+
+/// One layer: an INPUT's files and where they stand.
+#[derive(Clone, Debug)]
+pub struct Layer {
+    /// Its name.
+    pub name: String,
+    /// Its files, ordered by number, at least one.
+    pub files: Vec<FrameFile>,
+    /// An MTL whose materials replace those of the same name.
+    pub materials: Option<PathBuf>,
+    /// Its transform over time.
+    pub placed: Option<Placed>,
+}
+
+/// One picture.
+#[derive(Clone, Debug)]
+pub struct Picture {
+    /// The sequence, by its place in the job.
+    pub sequence: usize,
+    /// The frame's number, if it has one.
+    pub frame: Option<i64>,
+    /// What stands in it, layer by layer.
+    pub sources: Vec<Source>,
+    /// The picture's file, relative to the output folder.
+    pub picture: PathBuf,
+    /// Its settings.
+    pub settings: Arc<Settings>,
+}
+
+/// What one layer shows in one picture.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Source {
+    /// The layer, by its place in the sequence.
+    pub layer: usize,
+    /// The file, by its place in the layer; None: it is hidden.
+    pub file: Option<usize>,
+    /// World from object, where the job gives a transform.
+    pub transform: Option<DAffine3>,
+}
+
+impl Picture {
+    /// The file that names the picture: that of the first layer that moves, else of the first.
+    pub fn main_file<'a>(&self, sequence: &'a Sequence) -> Option<&'a FrameFile> {
+        let moves = |s: &&Source| sequence.layers[s.layer].files.len() > 1;
+        let source = self.sources.iter().find(moves).or(self.sources.first())?;
+        source.file.map(|i| &sequence.layers[source.layer].files[i])
+    }
+}
+
+/// Why nothing can be tried (exit status 2).
+#[derive(Debug, thiserror::Error)]
+pub enum JobError {
+    /// Nothing was named.
+    #[error("no INPUT; name a folder of OBJ frames, an OBJ file or a job file")]
+    NoInput,
+    /// There is no such file, folder or pattern.
+    #[error("{}: there is no such file or folder; check the name", .0.display())]
+    Absent(PathBuf),
+    /// A folder without frames.
+    #[error("{}: no .obj file in this folder; name a folder that holds the frames", .0.display())]
+    NoFrames(PathBuf),
+    /// A pattern without matches.
+    #[error("{}: no .obj file matches this pattern", .0.display())]
+    NoMatch(PathBuf),
+    /// Some other file.
+    #[error("{}: is neither a folder nor an .obj, .yaml or .yml file", .0.display())]
+    NotAnInput(PathBuf),
+    /// glTF comes with a later version.
+    #[error("{}: glTF is not supported by this version; export OBJ frames", .0.display())]
+    Gltf(PathBuf),
+    /// The system refuses.
+    #[error("{}: cannot be read: {source}; check that it exists and that its permissions allow reading", path.display())]
+    Unreadable {
+        /// File or folder.
+        path: PathBuf,
+        /// What the system said.
+        source: io::Error,
+    },
+    /// Two files for one frame.
+    #[error("frame {number} is given twice: {} and {}; remove one, or use --one-sequence", first.display(), second.display())]
+    TwoOfANumber {
+        /// The frame.
+        number: i64,
+        /// One file.
+        first: PathBuf,
+        /// The other.
+        second: PathBuf,
+    },
+    /// `--strict` and frames are missing.
+    #[error("{}: {text} (--strict)", input.display())]
+    Gaps {
+        /// The INPUT.
+        input: PathBuf,
+        /// Which are missing.
+        text: String,
+    },
+    /// A number that was asked for and that no sequence has.
+    #[error("frame {0} was asked for and no sequence has it; `rentix inspect` shows the frames")]
+    NoSuchFrame(i64),
+    /// Two frames of a sequence would write one picture.
+    #[error("two frames would both be written to {}; put {{stem}} or {{frame}} into the name", .0.display())]
+    TwoOfAName(PathBuf),
+    /// The job file is wrong.
+    #[error("{}{place}: {text}", path.display())]
+    File {
+        /// The job file.
+        path: PathBuf,
+        /// `:LINE:COLUMN` where it is known.
+        place: String,
+        /// What is wrong.
+        text: String,
+    },
+    /// A combination of options is wrong.
+    #[error("{0}")]
+    Options(String),
+}

@@ -23,6 +23,23 @@ impl Residency {
     pub fn bytes(&self) -> u64 {
         self.held.values().sum()
     }
+
+    /// A part or tree was there when a frame needed it.
+    pub fn keep(&mut self) {
+        self.hits += 1;
+    }
+
+    /// A part or tree was not there and is now held.
+    pub fn hold(&mut self, name: PartHash, bytes: u64) {
+        self.misses += 1;
+        self.held.insert(name, bytes);
+        self.peak_bytes = self.peak_bytes.max(self.bytes());
+    }
+
+    /// Gives up a part or tree.
+    pub fn free(&mut self, name: PartHash) {
+        self.held.remove(&name);
+    }
 }
 
 /// One step of a plan.
@@ -95,6 +112,17 @@ impl UpdatePlan {
     /// Whether something that the frame needs was resident already.
     pub fn is_warm(&self) -> bool {
         self.steps.iter().any(|s| matches!(s, Step::Keep { .. }))
+    }
+
+    /// Bytes that will be held after it, trees that are to be built estimated at so many bytes a triangle.
+    pub fn needed_bytes(&self, residency: &Residency, tree_bytes_per_triangle: u64) -> u64 {
+        let of_step = |step: &Step| match step {
+            Step::Free { .. } => 0,
+            Step::Keep { name } => residency.held.get(name).copied().unwrap_or(0),
+            Step::Upload { bytes, .. } => *bytes,
+            Step::Build { triangles, .. } => triangles * tree_bytes_per_triangle,
+        };
+        self.steps.iter().map(of_step).sum()
     }
 }
 

@@ -1,1 +1,204 @@
-//! To be written.
+//! A run: reader, device and writer stages, threads joined by bounded queues. Reading frame n + 2, tracing n + 1 and
+//! encoding n overlap; memory is bounded by the queues' lengths. An error is a value that travels with its frame.
+
+mod check;
+pub mod event;
+pub mod machine;
+mod prepare;
+mod read;
+mod report;
+mod slots;
+mod source;
+mod trace;
+mod write;
+
+
+pub use event::{Event, FrameReport, Status};
+pub use read::read_frame;
+pub use report::{DeviceReport, Report, Totals};
+
+use crate::clock::Stopwatch;
+use crate::device::{Device, Stop};
+use crate::film::Film;
+use crate::job::Job;
+use crate::output::{self, OutputError, Records, RunLog};
+use crate::warning::Warnings;
+use read::ReadFrame;
+use slots::Slots;
+use std::path::PathBuf;
+use std::sync::atomic::AtomicUsize;
+use std::sync::mpsc::{channel, sync_channel};
+use std::sync::{Arc, Mutex};
+
+/// Frames read ahead of the device, those being read included.
+const FRAMES_READ_AHEAD: usize = 3;
+/// Most threads that read, and most that encode: two of each keep one device busy.
+const STAGE_THREADS_MAX: usize = 2;
+
+/// What of the command line bears on the run itself.
+#[derive(Clone, Debug, Default)]
+#[allow(clippy::struct_excessive_bools, reason = "each is a switch that a user types")]
+pub struct RunOptions {
+    /// Threads of reading and of encoding; the device has its own.
+    pub threads: usize,
+    /// Forget everything between frames.
+    pub cold: bool,
+    /// Render finished frames anew and write over files that no record names.
+    pub overwrite: bool,
+    /// Drop faces that cannot be rendered instead of failing their frame.
+    pub lenient: bool,
+    /// What is missing fails its frame.
+    pub strict: bool,
+    /// Where the report goes.
+    pub report: Option<PathBuf>,
+}
+
+/// Why a run could not begin (exit status 2).
+#[derive(Debug, thiserror::Error)]
+pub enum RunError {
+    /// A picture would go where something else is.
+    #[error("{} is there already and no record of a run names it; nothing is rendered (--overwrite writes over it, -o names another folder)", .0.display())]
+    Foreign(PathBuf),
+    /// A picture would go where an input is.
+    #[error("{} is an input of this job and would be overwritten; nothing is rendered (-o names another folder)", .0.display())]
+    OverInput(PathBuf),
+    /// The output folder cannot be used.
+    #[error(transparent)]
+    Output(#[from] OutputError),
+    /// The report cannot be written; the pictures are there.
+    #[error("the report cannot be written: {0}")]
+    Report(OutputError),
+}
+
+/// How a run ended.
+#[derive(Debug)]
+pub struct Outcome {
+    /// The report, settled.
+    pub report: Report,
+    /// Whether it was stopped before its end.
+    pub stopped: bool,
+}
+
+impl Outcome {
+    /// The frames that failed.
+    pub fn failed(&self) -> impl Iterator<Item = &FrameReport> {
+        self.report.frames.iter().filter(|f| f.status == Status::Failed)
+    }
+}
+
+/// What the stages tell the thread that runs the run.
+enum Note {
+    Frame(Box<FrameReport>),
+    Warnings(Warnings),
+    Device(DeviceReport),
+}
+
+/// A traced frame on its way to its file.
+struct Shown {
+    film: Film,
+    read: ReadFrame,
+}
+
+/// Renders a job on a device. `on_event` is called on this thread.
+pub fn render(
+    job: &Job,
+    options: &RunOptions,
+    mut device: Box<dyn Device>,
+    stop: &Stop,
+    on_event: &mut dyn FnMut(&Event),
+) -> Result<Outcome, RunError> {
+    let since = Stopwatch::start();
+    let records = Records::read(&job.folder)?;
+    check::nothing_is_lost(job, &records, options)?;
+    clean_up(job);
+    let mut warnings = Warnings::default();
+    let mut report = Report::new(vec![DeviceReport::new(device.info())]);
+    on_event(&Event::Start {
+        frames: job.pictures.len(),
+        folder: job.folder.display().to_string(),
+        devices: vec![device.info().name.clone()],
+    });
+    tell(&job.warnings, &mut warnings, &mut report, on_event);
+    let prepared = prepare::prepare(job, options);
+    tell(&prepared.warnings, &mut warnings, &mut report, on_event);
+
+    let reader = read::Reader::new(job, options, &records, prepared);
+    let log = RunLog::create(&job.folder);
+    let next = AtomicUsize::new(0);
+    let slots = Slots::new(FRAMES_READ_AHEAD);
+    let threads = options.threads.clamp(1, STAGE_THREADS_MAX);
+    let mut saved = report::Saver::new(options.report.clone());
+
+    std::thread::scope(|scope| {
+        let (note, notes) = channel::<Note>();
+        let (to_device, from_readers) = channel::<Result<ReadFrame, Box<FrameReport>>>();
+        // no queue between device and writers: a film waits in the device stage until a writer is free
+        let (to_writers, from_device) = sync_channel::<Shown>(0);
+        let from_device = Arc::new(Mutex::new(from_device));
+        for _ in 0..threads {
+            let (to_device, note) = (to_device.clone(), note.clone());
+            let (reader, next, slots) = (&reader, &next, &slots);
+            scope.spawn(move || read::read_stage(reader, next, slots, stop, &to_device, &note));
+        }
+        drop(to_device);
+        {
+            let (note, slots, device) = (note.clone(), &slots, &mut device);
+            scope.spawn(move || {
+                trace::device_stage(&mut **device, options, &from_readers, slots, stop, &to_writers, &note);
+            });
+        }
+        for _ in 0..threads {
+            let (log, from_device, note) = (&log, Arc::clone(&from_device), note.clone());
+            scope.spawn(move || write::write_stage(log, &from_device, &note));
+        }
+        drop(from_device);
+        drop(note);
+
+        for note in notes {
+            match note {
+                Note::Frame(frame) => {
+                    on_event(&Event::Frame(frame.clone()));
+                    report.frame(*frame);
+                }
+                Note::Warnings(w) => tell(&w, &mut warnings, &mut report, on_event),
+                Note::Device(d) => report.devices[0] = d,
+            }
+            // what cannot be written now is tried again, and told of at the end
+            let _ = saved.save(&mut report, &since, false);
+        }
+    });
+
+    if !stop.asked() {
+        for gone in check::pictures_gone(job, &mut report) {
+            on_event(&Event::Frame(Box::new(gone)));
+        }
+    }
+    report.warnings = warnings.list().iter().map(ToString::to_string).collect();
+    report.settle(&since);
+    let stopped = stop.asked();
+    saved.save(&mut report, &since, true).map_err(RunError::Report).map(|()| Outcome { report, stopped })
+}
+
+/// What a caught panic says, for the error of its frame.
+fn panic_text(stage: &str, panic: &(dyn std::any::Any + Send)) -> String {
+    let text =
+        panic.downcast_ref::<String>().map(String::as_str).or_else(|| panic.downcast_ref::<&str>().copied());
+    format!(
+        "internal error while {stage}: {}; the other frames go on, please report this",
+        text.unwrap_or("no text")
+    )
+}
+
+/// Clears up after dead runs. What cannot be cleared up does no harm.
+fn clean_up(job: &Job) {
+    let _ = output::clean_up(&job.folder, job.pictures.iter().map(|p| p.picture.as_path()));
+}
+
+/// Tells of those warnings that are new.
+fn tell(new: &Warnings, all: &mut Warnings, report: &mut Report, on_event: &mut dyn FnMut(&Event)) {
+    let fresh = all.merge(new);
+    report.warnings.extend(fresh.iter().map(ToString::to_string));
+    for w in fresh {
+        on_event(&Event::Warning(w));
+    }
+}

@@ -5,8 +5,10 @@ pub mod frame;
 pub mod geometry;
 pub mod light;
 pub mod material;
+pub mod normals;
 pub mod part;
 pub mod shot;
+pub mod texture;
 
 pub use camera::Camera;
 pub use frame::{Frame, Object};
@@ -15,6 +17,7 @@ pub use geometry::{
     Triangles,
 };
 pub use light::{Falloff, Light};
-pub use material::{MapFile, Material};
+pub use material::{MapFile, Material, Textures};
 pub use part::{Content, Part, PartHash, PartHasher};
 pub use shot::{Aov, AovSet, Filter, Shot};
+pub use texture::{Channel, Map, Reflection, TexelSpace, Texels, Texture};

@@ -1,1 +1,73 @@
-//! To be written.
+//! The cores of the host: trees that stay, tiles over threads.
+
+mod resident;
+mod trace;
+
+use super::{Device, DeviceError, DeviceInfo, DeviceKind, Stop, Traced, UpdateCost};
+use crate::accel::Width;
+use crate::plan::{Residency, UpdatePlan};
+use crate::scene::{Frame, Shot};
+use rayon::{ThreadPool, ThreadPoolBuildError, ThreadPoolBuilder};
+use resident::Resident;
+
+/// The CPU device.
+#[derive(Debug)]
+pub struct CpuDevice {
+    info: DeviceInfo,
+    pool: ThreadPool,
+    resident: Resident,
+    width: Width,
+}
+
+impl CpuDevice {
+    /// A device with a pool of its own, of so many threads (0: one for each core), that may hold so many bytes.
+    ///
+    /// # Errors
+    /// Where the system gives no threads.
+    pub fn new(threads: usize, budget_bytes: u64) -> Result<Self, ThreadPoolBuildError> {
+        let pool =
+            ThreadPoolBuilder::new().num_threads(threads).thread_name(|i| format!("trace-{i}")).build()?;
+        let width = Width::detect();
+        let threads = pool.current_num_threads();
+        let info = DeviceInfo {
+            name: "cpu".to_string(),
+            kind: DeviceKind::Cpu,
+            description: format!("{threads} threads, {width:?}"),
+            threads,
+            budget_bytes,
+        };
+        Ok(Self { info, pool, resident: Resident::default(), width })
+    }
+
+    /// Traces in another SIMD width; one that the machine lacks is not taken. The pictures are the same.
+    #[must_use]
+    pub fn with_width(mut self, width: Width) -> Self {
+        if Width::available().contains(&width) {
+            self.width = width;
+        }
+        self
+    }
+}
+
+impl Device for CpuDevice {
+    fn info(&self) -> &DeviceInfo {
+        &self.info
+    }
+
+    fn residency(&self) -> &Residency {
+        self.resident.residency()
+    }
+
+    fn apply(&mut self, plan: &UpdatePlan, frame: &Frame) -> Result<UpdateCost, DeviceError> {
+        self.resident.apply(plan, frame, &self.pool, &self.info)
+    }
+
+    fn trace(&mut self, frame: &Frame, shot: &Shot, stop: &Stop) -> Result<Traced, DeviceError> {
+        let scene = self
+            .resident
+            .scene(frame)
+            .map_err(|object| DeviceError::NotResident { device: self.info.name.clone(), object })?
+            .with_width(self.width);
+        self.pool.install(|| trace::trace(&scene, frame, shot, stop))
+    }
+}

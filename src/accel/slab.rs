@@ -1,0 +1,140 @@
+//! Boxes and the slab test: one function for nodes and for the triangles' own boxes, so that a box that contains
+//! another is never entered later nor missed (every step is monotonic in the planes).
+
+use super::Ray;
+use super::lanes::{Lanes, per_axis};
+
+/// Factor on the exit of a box. Let u = 2⁻²⁴. The slab test's own roundings need 1 + 6u (Ize, "Robust BVH Ray
+/// Traversal", 2013: 1 + 2γ₃); the edge test sees a vertex displaced by up to 4u of its distance from the origin,
+/// which needs 8u more. The part of that displacement that is due to the triangle's size is in the own box's margin.
+pub(crate) const EXIT_FACTOR: f32 = 1.0 + 1.0 / 1048576.0;
+
+/// Direction components below this count as this, with their sign.
+const LEAST_DIRECTION: f32 = 1e-20;
+
+/// An axis-aligned box in f32.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Aabb {
+    /// Least corner.
+    pub min: [f32; 3],
+    /// Greatest corner.
+    pub max: [f32; 3],
+}
+
+impl Aabb {
+    /// The box that holds nothing; no ray enters it.
+    pub const EMPTY: Self = Self { min: [f32::INFINITY; 3], max: [f32::NEG_INFINITY; 3] };
+
+    /// The box of points; empty without any.
+    pub fn of_points(points: &[[f32; 3]]) -> Self {
+        points.iter().fold(Self::EMPTY, |b, &p| b.union(&Self { min: p, max: p }))
+    }
+
+    /// The least box that holds both.
+    #[inline(always)]
+    #[must_use]
+    pub fn union(&self, other: &Self) -> Self {
+        Self {
+            min: per_axis(|k| Lanes::min(self.min[k], other.min[k])),
+            max: per_axis(|k| Lanes::max(self.max[k], other.max[k])),
+        }
+    }
+
+    /// Whether the other lies inside.
+    pub fn contains(&self, other: &Self) -> bool {
+        (0..3).all(|k| self.min[k] <= other.min[k] && self.max[k] >= other.max[k])
+    }
+
+    /// Whether it holds nothing.
+    pub fn is_empty(&self) -> bool {
+        self.min[0] > self.max[0]
+    }
+
+    /// A triangle's own box: that of its corners, each side moved out by 8 ULP (2⁻²³) of the largest extent and then
+    /// to the next float.
+    #[inline(always)]
+    pub fn own(corners: &[[f32; 3]; 3]) -> Self {
+        let [a, b, c] = corners;
+        let min = per_axis(|k| Lanes::min(a[k], Lanes::min(b[k], c[k])));
+        let max = per_axis(|k| Lanes::max(a[k], Lanes::max(b[k], c[k])));
+        let extent = Lanes::max(max[0] - min[0], Lanes::max(max[1] - min[1], max[2] - min[2]));
+        let margin = extent * (8.0 * f32::EPSILON);
+        Self { min: per_axis(|k| -next_up(margin - min[k])), max: per_axis(|k| next_up(max[k] + margin)) }
+    }
+}
+
+/// The next greater float; what is not finite stays. Like `f32::next_up`, but without branches.
+#[inline(always)]
+fn next_up(x: f32) -> f32 {
+    let bits = (x + 0.0).to_bits();
+    let next = if bits >> 31 == 0 { bits + 1 } else { bits - 1 };
+    if x.is_finite() { f32::from_bits(next) } else { x }
+}
+
+/// 1 / a direction's component; what is below [`LEAST_DIRECTION`] counts as that.
+#[inline(always)]
+pub(crate) fn inverse(d: f32) -> f32 {
+    1.0 / if d.abs() < LEAST_DIRECTION { LEAST_DIRECTION.copysign(d) } else { d }
+}
+
+/// A ray as the slab test wants it.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct SlabRay<L> {
+    pub(crate) origin: [L; 3],
+    /// 1 / direction, see [`inverse`].
+    pub(crate) inverse: [L; 3],
+    /// For each axis the side that is entered first: 0 the lesser plane, 1 the greater.
+    pub(crate) near_side: [usize; 3],
+}
+
+impl<L: Lanes> SlabRay<L> {
+    #[inline(always)]
+    pub(crate) fn new(ray: &Ray) -> Self {
+        let o = ray.origin.to_array();
+        let d = ray.direction.to_array();
+        let i = per_axis(|k| inverse(d[k]));
+        Self {
+            origin: per_axis(|k| L::splat(o[k])),
+            inverse: per_axis(|k| L::splat(i[k])),
+            near_side: per_axis(|k| usize::from(i[k] < 0.0)),
+        }
+    }
+
+    /// Which of the rays enter one box, not after their ends.
+    #[inline(always)]
+    pub(crate) fn enters(&self, b: &Aabb, ends: L) -> u32 {
+        let (near, far) = sides(b, self.near_side);
+        let (entry, exit) = self.pass(per_axis(|k| L::splat(near[k])), per_axis(|k| L::splat(far[k])));
+        entry.le(ends.min(exit))
+    }
+
+    /// Where the ray enters (0 where it starts inside) and leaves boxes whose planes are given in the order in which
+    /// it meets them. A box is hit where the entry is not greater than the exit.
+    #[inline(always)]
+    pub(crate) fn pass(&self, near: [L; 3], far: [L; 3]) -> (L, L) {
+        let [o, i] = [&self.origin, &self.inverse];
+        let near = per_axis(|k| near[k].sub(o[k]).mul(i[k]));
+        let far = per_axis(|k| far[k].sub(o[k]).mul(i[k]));
+        let entry = near[0].max(near[1]).max(near[2].max(L::splat(0.0)));
+        let exit = far[0].min(far[1]).min(far[2]).mul(L::splat(EXIT_FACTOR));
+        (entry, exit)
+    }
+}
+
+/// A box's corner that is met first, and the one met last.
+#[inline(always)]
+fn sides(b: &Aabb, near_side: [usize; 3]) -> ([f32; 3], [f32; 3]) {
+    let sides = [&b.min, &b.max];
+    let [x, y, z] = near_side;
+    ([sides[x][0], sides[y][1], sides[z][2]], [sides[1 - x][0], sides[1 - y][1], sides[1 - z][2]])
+}
+
+impl SlabRay<f32> {
+    /// Where the ray enters one box; None where it misses it.
+    #[inline(always)]
+    pub(crate) fn entry(&self, b: &Aabb) -> Option<f32> {
+        let (near, far) = sides(b, self.near_side);
+        let (entry, exit) = self.pass(near, far);
+        (entry <= exit).then_some(entry)
+    }
+}

@@ -1,0 +1,193 @@
+//! The canonical hit of one triangle: Woop's watertight edge test (Woop, Benthin, Wald, "Watertight Ray/Triangle
+//! Intersection", JCGT 2013) without its double precision fallback, and the slab test of the triangle's own box.
+//!
+//! Watertight: a projected vertex is a function of ray and vertex alone, so neighbours see the same one; the two
+//! products of an edge's value are rounded monotonically, so its sign is right or the value is 0, and 0 counts for
+//! both neighbours, whose values are negatives of each other bit for bit (nothing is fused).
+
+use super::lanes::{Lanes, per_axis};
+use super::slab::{Aabb, SlabRay};
+use super::{HitOrder, Ray};
+
+/// A ray as the edge test wants it: its largest component is along the last axis, the others are sheared away.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct ShearRay<L> {
+    /// The axes (x, y, z) of the sheared space.
+    pub(crate) axes: [usize; 3],
+    origin: [L; 3],
+    shear: [L; 3],
+}
+
+/// Values of the three edges, each opposite to a corner: its weight times the determinant.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Edges<L> {
+    /// Opposite to the first, second and third corner.
+    pub(crate) values: [L; 3],
+    depths: [L; 3],
+}
+
+impl<L: Lanes> ShearRay<L> {
+    #[inline(always)]
+    pub(crate) fn new(ray: &Ray) -> Self {
+        let d = ray.direction.to_array();
+        let size = per_axis(|k| d[k].abs());
+        let kz =
+            if size[0] >= size[1] && size[0] >= size[2] { 0 } else { 1 + usize::from(size[1] < size[2]) };
+        let axes = [(kz + 1) % 3, (kz + 2) % 3, kz];
+        let o = ray.origin.to_array();
+        let z = d[kz];
+        Self {
+            axes,
+            origin: per_axis(|k| L::splat(o[axes[k]])),
+            shear: [L::splat(d[axes[0]] / z), L::splat(d[axes[1]] / z), L::splat(1.0 / z)],
+        }
+    }
+
+    /// A vertex, its coordinates in the order of [`Self::axes`], as seen along the ray.
+    #[inline(always)]
+    fn project(&self, v: [L; 3]) -> [L; 3] {
+        let z = v[2].sub(self.origin[2]);
+        let x = v[0].sub(self.origin[0]).sub(self.shear[0].mul(z));
+        let y = v[1].sub(self.origin[1]).sub(self.shear[1].mul(z));
+        [x, y, z]
+    }
+
+    /// The edges' values; corners with their coordinates in the order of [`Self::axes`].
+    #[inline(always)]
+    pub(crate) fn edges(&self, a: [L; 3], b: [L; 3], c: [L; 3]) -> Edges<L> {
+        let [ax, ay, az] = self.project(a);
+        let [bx, by, bz] = self.project(b);
+        let [cx, cy, cz] = self.project(c);
+        Edges {
+            values: [cx.mul(by).sub(cy.mul(bx)), ax.mul(cy).sub(ay.mul(cx)), bx.mul(ay).sub(by.mul(ax))],
+            depths: [az, bz, cz],
+        }
+    }
+
+    /// The distance of the triangle's plane along the ray. NaN where the determinant is 0.
+    #[inline(always)]
+    pub(crate) fn plane(&self, edges: &Edges<L>) -> L {
+        let [u, v, w] = edges.values;
+        let [az, bz, cz] = edges.depths;
+        let depth = u.mul(az).add(v.mul(bz)).add(w.mul(cz));
+        depth.div(edges.determinant()).mul(self.shear[2])
+    }
+}
+
+impl ShearRay<f32> {
+    /// The same ray in all lanes.
+    #[inline(always)]
+    pub(crate) fn splat<L: Lanes>(&self) -> ShearRay<L> {
+        ShearRay {
+            axes: self.axes,
+            origin: per_axis(|k| L::splat(self.origin[k])),
+            shear: per_axis(|k| L::splat(self.shear[k])),
+        }
+    }
+}
+
+impl<L: Lanes> Edges<L> {
+    /// Lanes whose values are all of one sign; 0 has either. Both sides of a triangle are hit.
+    #[inline(always)]
+    pub(crate) fn inside(&self) -> u32 {
+        let [u, v, w] = self.values;
+        let zero = L::splat(0.0);
+        zero.le(u.min(v.min(w))) | u.max(v.max(w)).le(zero)
+    }
+
+    /// Weights of the second and third corner.
+    #[inline(always)]
+    pub(crate) fn barycentric(&self) -> [L; 2] {
+        let det = self.determinant();
+        [self.values[1].div(det), self.values[2].div(det)]
+    }
+
+    #[inline(always)]
+    fn determinant(&self) -> L {
+        let [u, v, w] = self.values;
+        u.add(v).add(w)
+    }
+}
+
+/// Whether a triangle can be hit: its normal, computed in f64 (which neither overflows nor underflows), is neither 0 nor
+/// not finite.
+pub fn has_area(corners: &[[f32; 3]; 3]) -> bool {
+    let [a, b, c] = corners.map(|p| p.map(f64::from));
+    let e = per_axis(|k| b[k] - a[k]);
+    let f = per_axis(|k| c[k] - a[k]);
+    let n = [e[1] * f[2] - e[2] * f[1], e[2] * f[0] - e[0] * f[2], e[0] * f[1] - e[1] * f[0]];
+    n.iter().all(|x| x.is_finite()) && n != [0.0; 3]
+}
+
+/// What is looked for along a ray: the first candidate strictly between two places of the order.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Search {
+    after: HitOrder,
+    /// The first candidate yet, or where the search ends.
+    pub(crate) before: HitOrder,
+}
+
+impl Search {
+    /// After a place, or anywhere along the ray: distances are above 0.
+    #[inline(always)]
+    pub(crate) fn after(after: Option<HitOrder>) -> Self {
+        Self {
+            after: after.unwrap_or(HitOrder { distance: 0.0, primitive: 0 }),
+            before: HitOrder { distance: f32::INFINITY, primitive: 0 },
+        }
+    }
+
+    /// Before a distance.
+    #[inline(always)]
+    pub(crate) fn until(end: f32) -> Self {
+        Self { before: HitOrder { distance: end, primitive: 0 }, ..Self::after(None) }
+    }
+
+    /// Looks for nothing more.
+    #[inline(always)]
+    pub(crate) fn end(&mut self) {
+        self.before.distance = f32::NEG_INFINITY;
+    }
+
+    /// Whether a candidate is what is looked for.
+    #[inline(always)]
+    pub(crate) fn admits(&self, candidate: HitOrder) -> bool {
+        precedes(self.after, candidate) && precedes(candidate, self.before)
+    }
+}
+
+#[inline(always)]
+fn precedes(a: HitOrder, b: HitOrder) -> bool {
+    a.distance < b.distance || (a.distance == b.distance && a.primitive < b.primitive)
+}
+
+/// A ray against one triangle at a time: the reference.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct ScalarRay {
+    slab: SlabRay<f32>,
+    shear: ShearRay<f32>,
+}
+
+impl ScalarRay {
+    pub(crate) fn new(ray: &Ray) -> Self {
+        Self { slab: SlabRay::new(ray), shear: ShearRay::new(ray) }
+    }
+
+    /// The canonical distance of a triangle that has area, and the weights of its second and third corner; None where
+    /// it is not hit.
+    pub(crate) fn hit(&self, corners: &[[f32; 3]; 3]) -> Option<(f32, [f32; 2])> {
+        let [a, b, c] = corners.map(|p| self.shear.axes.map(|k| p[k]));
+        let edges = self.shear.edges(a, b, c);
+        if edges.inside() == 0 {
+            return None;
+        }
+        let t = self.shear.plane(&edges);
+        if t > 0.0 { Some((distance_in_plane(&self.slab, corners, t)?, edges.barycentric())) } else { None }
+    }
+}
+
+/// The canonical distance of a triangle whose plane is hit inside it at t.
+#[inline(always)]
+pub(crate) fn distance_in_plane(slab: &SlabRay<f32>, corners: &[[f32; 3]; 3], t: f32) -> Option<f32> {
+    slab.entry(&Aabb::own(corners)).map(|entry| Lanes::max(t, entry))
+}

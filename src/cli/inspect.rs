@@ -1,0 +1,117 @@
+//! `rentix inspect`: what is in a sequence and what changes from frame to frame.
+
+use super::render_args::RenderArgs;
+use super::{EXIT_FAILED, Global, request};
+use crate::diff::{Change, changes};
+use crate::job::{self, Job, Picture};
+use crate::run::read_frame;
+use crate::scene::Frame;
+use crate::warning::Warnings;
+use anyhow::Result;
+use std::process::ExitCode;
+
+/// What is told of one frame.
+struct Seen {
+    triangles: u64,
+    vertices: u64,
+    meshes: usize,
+    materials: usize,
+    change: Change,
+}
+
+/// Reads every chosen frame and tells what is in it; renders nothing.
+pub(super) fn inspect(args: &RenderArgs, global: &Global) -> Result<ExitCode> {
+    let job = job::resolve(&request::request(args)?)?;
+    let mut warnings = Warnings::default();
+    for w in job.warnings.list() {
+        say(global, &format!("warning: {w}"));
+    }
+    let mut failed = 0;
+    let mut before: Option<(usize, Frame)> = None;
+    for picture in &job.pictures {
+        match read_frame(&job, picture, args.lenient, &mut warnings) {
+            Err(error) => {
+                failed += 1;
+                eprintln!("error: {error}");
+                before = None;
+            }
+            Ok(frame) => {
+                let same_sequence = before.as_ref().filter(|(s, _)| *s == picture.sequence);
+                let seen = look(same_sequence.map(|(_, f)| f), &frame);
+                tell(
+                    &job,
+                    picture,
+                    &seen,
+                    before.as_ref().is_none_or(|(s, _)| *s != picture.sequence),
+                    global,
+                );
+                before = Some((picture.sequence, frame));
+            }
+        }
+    }
+    for w in warnings.list() {
+        say(global, &format!("warning: {w}"));
+    }
+    Ok(if failed == 0 { ExitCode::SUCCESS } else { ExitCode::from(EXIT_FAILED) })
+}
+
+fn say(global: &Global, line: &str) {
+    if !global.quiet {
+        eprintln!("{line}");
+    }
+}
+
+fn look(before: Option<&Frame>, frame: &Frame) -> Seen {
+    let geometries = || frame.objects.iter().map(|o| &o.geometry);
+    Seen {
+        triangles: frame.triangles(),
+        vertices: geometries().map(|g| g.positions.0.len() as u64).sum(),
+        meshes: geometries().map(|g| g.meshes.len()).sum(),
+        materials: geometries().map(|g| g.materials.len()).sum(),
+        change: changes(before, frame),
+    }
+}
+
+fn tell(job: &Job, picture: &Picture, seen: &Seen, first: bool, global: &Global) {
+    let sequence = &job.sequences[picture.sequence];
+    let source = picture.main_file(sequence).map(|f| f.stem.clone()).unwrap_or_default();
+    if global.json {
+        let line = serde_json::json!({
+            "sequence": sequence.name, "frame": picture.frame, "source": source, "triangles": seen.triangles,
+            "vertices": seen.vertices, "meshes": seen.meshes, "materials": seen.materials, "change": seen.change,
+        });
+        println!("{line}");
+        return;
+    }
+    if first {
+        println!("{}", sequence.name);
+        println!(
+            "{:>24} {:>10} {:>10} {:>7} {:>9}  change",
+            "frame", "triangles", "vertices", "meshes", "materials"
+        );
+    }
+    println!(
+        "{source:>24} {:>10} {:>10} {:>7} {:>9}  {}",
+        seen.triangles,
+        seen.vertices,
+        seen.meshes,
+        seen.materials,
+        words(&seen.change)
+    );
+}
+
+fn words(c: &Change) -> String {
+    let counts = [
+        (c.same, "same"),
+        (c.rigid, "rigid"),
+        (c.deformed, "deformed"),
+        (c.reshaped, "reshaped"),
+        (c.added, "added"),
+        (c.removed, "removed"),
+        (c.materials, "materials"),
+        (c.textures, "textures"),
+    ];
+    let list: Vec<String> =
+        counts.iter().filter(|(n, _)| *n > 0).map(|(n, word)| format!("{n} {word}")).collect();
+    if list.is_empty() { "nothing in it".to_string() } else { list.join(", ") }
+}

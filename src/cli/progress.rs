@@ -1,0 +1,132 @@
+//! Progress on stderr: a bar on a terminal, elsewhere a plain line at most every 5 s.
+
+use crate::clock::Stopwatch;
+use crate::run::{Event, FrameReport, Status};
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use std::io::IsTerminal;
+use std::time::Duration;
+
+/// How progress is shown.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default, clap::ValueEnum)]
+pub(super) enum ProgressKind {
+    /// A bar on a terminal, else plain lines.
+    #[default]
+    Auto,
+    /// A bar.
+    Bar,
+    /// A line at most every 5 s.
+    Plain,
+    /// Events as JSON on stdout, as --json.
+    Json,
+    /// Nothing.
+    None,
+}
+
+/// Draws progress from a run's events.
+pub(super) struct Progress {
+    bar: Option<ProgressBar>,
+    plain: bool,
+    verbose: bool,
+    since: Stopwatch,
+    told_s: f64,
+    frames: usize,
+    ended: usize,
+    failed: usize,
+}
+
+const PLAIN_EVERY_S: f64 = 5.0;
+
+impl Progress {
+    /// Progress of the given kind.
+    pub(super) fn new(kind: ProgressKind, verbose: bool) -> Self {
+        let bar = match kind {
+            ProgressKind::Bar => true,
+            ProgressKind::Auto => std::io::stderr().is_terminal(),
+            _ => false,
+        };
+        let bar = bar.then(|| {
+            let bar = ProgressBar::with_draw_target(None, ProgressDrawTarget::stderr_with_hz(8));
+            let style = ProgressStyle::with_template(
+                "{prefix} {bar:32} {pos}/{len} frames  {per_sec}  {eta} left  {msg}",
+            );
+            bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()).progress_chars("━╸─"));
+            bar.enable_steady_tick(Duration::from_millis(250));
+            bar
+        });
+        Self {
+            plain: bar.is_none() && matches!(kind, ProgressKind::Auto | ProgressKind::Plain),
+            bar,
+            verbose,
+            since: Stopwatch::start(),
+            told_s: 0.0,
+            frames: 0,
+            ended: 0,
+            failed: 0,
+        }
+    }
+
+    /// Shows an event.
+    pub(super) fn event(&mut self, event: &Event) {
+        match event {
+            Event::Start { frames, .. } => {
+                self.frames = *frames;
+                if let Some(bar) = &self.bar {
+                    bar.set_length(*frames as u64);
+                }
+            }
+            Event::Frame(frame) => self.frame(frame),
+            Event::Warning(w) => self.line(&format!("warning: {w}")),
+        }
+    }
+
+    fn frame(&mut self, frame: &FrameReport) {
+        self.ended += 1;
+        if frame.status == Status::Failed {
+            self.failed += 1;
+            self.line(&format!("error: {}", frame.error.as_deref().unwrap_or("failed")));
+        } else if self.verbose {
+            let ms = |x: Option<f64>| x.map_or_else(|| "–".to_string(), |x| format!("{x:.1}"));
+            self.line(&format!(
+                "{}: {:?} on {}; ms: read {} parse {} update {} trace {} encode {} write {}",
+                frame.picture,
+                frame.status,
+                frame.device.as_deref().unwrap_or("no device"),
+                ms(frame.ms.read),
+                ms(frame.ms.parse),
+                ms(frame.ms.update),
+                ms(frame.ms.trace),
+                ms(frame.ms.encode),
+                ms(frame.ms.write),
+            ));
+        }
+        if let Some(bar) = &self.bar {
+            bar.inc(1);
+            if self.failed > 0 {
+                bar.set_message(format!("{} failed", self.failed));
+            }
+        } else if self.plain && self.since.s() - self.told_s >= PLAIN_EVERY_S {
+            self.told_s = self.since.s();
+            let rate = self.ended as f64 / self.told_s;
+            let left_s = (self.frames - self.ended.min(self.frames)) as f64 / rate;
+            self.line(&format!(
+                "{}/{} frames, {rate:.2} frames/s, {left_s:.0} s left",
+                self.ended, self.frames
+            ));
+        }
+    }
+
+    /// Prints a line above the bar.
+    pub(super) fn line(&self, text: &str) {
+        match &self.bar {
+            Some(bar) => bar.suspend(|| eprintln!("{text}")),
+            None => eprintln!("{text}"),
+        }
+    }
+
+    /// Takes the bar away.
+    pub(super) fn end(&self) {
+        if let Some(bar) = &self.bar {
+            bar.finish_and_clear();
+        }
+    }
+}

@@ -1,0 +1,151 @@
+//! `rentix render`.
+
+use super::progress::{Progress, ProgressKind};
+use super::render_args::RenderArgs;
+use super::{EXIT_FAILED, EXIT_NO_DEVICE, Global, request, stop};
+use crate::device::Device;
+use crate::device::cpu::CpuDevice;
+use crate::job::{self, Job};
+use crate::run::{self, Event, FrameReport, Outcome, RunOptions, machine};
+use anyhow::{Result, bail};
+use std::fmt::Write as _;
+use std::process::ExitCode;
+
+/// Renders what was asked for and tells how it went.
+pub(super) fn render(args: &RenderArgs, global: &Global) -> Result<ExitCode> {
+    let job = job::resolve(&request::request(args)?)?;
+    let device = device(args)?;
+    if args.dry_run {
+        dry_run(&job, global);
+        return Ok(ExitCode::SUCCESS);
+    }
+    let json = global.json || args.progress == ProgressKind::Json;
+    let kind = if global.quiet || json { ProgressKind::None } else { args.progress };
+    let mut progress = Progress::new(kind, global.verbose);
+    let stop = stop::on_signals()?;
+    let options = RunOptions {
+        threads: threads(args),
+        cold: args.cold,
+        overwrite: args.overwrite,
+        lenient: args.lenient,
+        strict: args.strict,
+        report: args.report.clone(),
+    };
+    let outcome = run::render(&job, &options, device, &stop.asked, &mut |event| {
+        if json {
+            println!("{}", event_json(event));
+        } else if !(global.quiet && matches!(event, Event::Warning(_))) {
+            progress.event(event);
+        }
+    })?;
+    progress.end();
+    if json {
+        println!("{}", end_json(&outcome));
+    }
+    Ok(conclude(&job, &outcome, global, &stop))
+}
+
+/// The device asked for.
+fn device(args: &RenderArgs) -> Result<Box<dyn Device>> {
+    match args.device.as_deref() {
+        None | Some("cpu" | "all") => {
+            let budget = args.device_memory.unwrap_or_else(machine::default_budget_bytes);
+            Ok(Box::new(CpuDevice::new(threads(args), budget)?))
+        }
+        Some(other) => bail!("there is no device {other}; `rentix devices` lists those there are"),
+    }
+}
+
+fn threads(args: &RenderArgs) -> usize {
+    args.threads.map_or_else(|| machine::machine().cores, usize::from)
+}
+
+/// Tells what would be rendered.
+fn dry_run(job: &Job, global: &Global) {
+    for picture in &job.pictures {
+        let sequence = &job.sequences[picture.sequence];
+        let source = picture.main_file(sequence).map(|f| f.path.display().to_string());
+        let path = job.folder.join(&picture.picture);
+        if global.json {
+            let line = serde_json::json!({
+                "sequence": sequence.name, "frame": picture.frame, "source": source, "picture": path.display().to_string(),
+            });
+            println!("{line}");
+        } else {
+            println!("{} -> {}", source.unwrap_or_else(|| "nothing".to_string()), path.display());
+        }
+    }
+}
+
+/// Says how the run ended; the exit status is CONTRACT 1's.
+fn conclude(job: &Job, outcome: &Outcome, global: &Global, stop: &stop::OnSignals) -> ExitCode {
+    let totals = &outcome.report.totals;
+    let failed: Vec<&FrameReport> = outcome.failed().collect();
+    if !global.quiet && !global.json {
+        let mut line = format!("{} rendered", totals.rendered);
+        for (count, word) in
+            [(totals.resumed, "found finished"), (totals.copied, "copied"), (totals.failed, "failed")]
+        {
+            if count > 0 {
+                let _ = write!(line, ", {count} {word}");
+            }
+        }
+        eprintln!("{line} in {:.1} s: {}", outcome.report.wall_s, job.folder.display());
+    }
+    if !failed.is_empty() {
+        eprintln!(
+            "{} of {} frames are missing; render them with {}",
+            failed.len(),
+            job.pictures.len(),
+            frame_list(&failed)
+        );
+    }
+    if outcome.stopped {
+        return ExitCode::from(stop.exit_status());
+    }
+    if failed.is_empty() {
+        ExitCode::SUCCESS
+    } else if failed.iter().all(|f| f.device_failed) {
+        ExitCode::from(EXIT_NO_DEVICE)
+    } else {
+        ExitCode::from(EXIT_FAILED)
+    }
+}
+
+/// The missing frames as an option to come back with; frames without a number by their files.
+fn frame_list(failed: &[&FrameReport]) -> String {
+    let mut numbers: Vec<i64> = failed.iter().filter_map(|f| f.frame).collect();
+    numbers.sort_unstable();
+    numbers.dedup();
+    let mut text = String::new();
+    if !numbers.is_empty() {
+        let list: Vec<String> = numbers.iter().map(ToString::to_string).collect();
+        let _ = write!(text, "--frames {}", list.join(","));
+    }
+    for f in failed.iter().filter(|f| f.frame.is_none()) {
+        let _ = write!(text, "{}{}", if text.is_empty() { "" } else { " and " }, f.source);
+    }
+    text
+}
+
+fn event_json(event: &Event) -> serde_json::Value {
+    match event {
+        Event::Start { frames, folder, devices } => {
+            serde_json::json!({"event": "start", "frames": frames, "folder": folder, "devices": devices})
+        }
+        Event::Frame(frame) => {
+            let mut value = serde_json::to_value(frame).unwrap_or_default();
+            value["event"] = "frame".into();
+            value
+        }
+        Event::Warning(w) => serde_json::json!({
+            "event": "warning", "text": w.to_string(), "count": w.count, "line": w.line,
+            "file": w.file.as_ref().map(|f| f.display().to_string()),
+        }),
+    }
+}
+
+fn end_json(outcome: &Outcome) -> serde_json::Value {
+    let r = &outcome.report;
+    serde_json::json!({"event": "end", "wall_s": r.wall_s, "totals": r.totals, "devices": r.devices, "stopped": outcome.stopped})
+}

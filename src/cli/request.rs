@@ -1,0 +1,92 @@
+//! What was typed becomes what is asked of the job.
+
+use super::render_args::RenderArgs;
+use crate::job::options::limits::{self, within};
+use crate::job::{CameraChoice, LightChoice, Options, Request, settings};
+use crate::scene::Filter;
+use anyhow::{Result, anyhow};
+use std::ops::RangeInclusive;
+use std::str::FromStr;
+
+/// Checks the options and gathers them.
+pub(super) fn request(args: &RenderArgs) -> Result<Request> {
+    Ok(Request {
+        inputs: args.inputs.clone(),
+        job_file: args.job.clone(),
+        options: options(args)?,
+        frames: parsed("--frames", args.frames.as_deref())?,
+        chunk: parsed("--chunk", args.chunk.as_deref())?,
+        order: parsed("--order", args.order.as_deref())?.unwrap_or_default(),
+        one_sequence: args.one_sequence,
+        strict: args.strict,
+        folder: args.output.clone(),
+    })
+}
+
+fn options(args: &RenderArgs) -> Result<Options> {
+    let lights = args.light.iter().map(|l| settings::light(l)).collect::<Result<Vec<_>, _>>();
+    let lights = lights.map_err(|e| anyhow!("--light: {e}"))?;
+    let aov = args.aov.as_ref().map(|list| settings::aovs(list.iter().map(String::as_str)));
+    Ok(Options {
+        size: args.size,
+        format: read("--format", args.format.as_deref(), settings::format_word)?,
+        name: args.name.clone(),
+        alpha: args.alpha.then_some(true),
+        bits: args
+            .bits
+            .map(|b| settings::bits(f64::from(b)))
+            .transpose()
+            .map_err(|e| anyhow!("--bits: {e}"))?,
+        quality: ranged("--quality", args.quality, &limits::QUALITY)?,
+        camera: None::<CameraChoice>,
+        eye: read("--eye", args.eye.as_deref(), settings::vector)?,
+        look_at: read("--look-at", args.look_at.as_deref(), settings::vector)?,
+        up: read("--up", args.up.as_deref(), settings::up)?,
+        fov: ranged("--fov", args.fov, &limits::FOV)?,
+        lights: (!lights.is_empty()).then_some(LightChoice::Given(lights)),
+        ambient: read("--ambient", args.ambient.as_deref(), settings::color)?,
+        background: read("--background", args.background.as_deref(), settings::color)?,
+        samples: ranged("--samples", args.samples, &limits::SAMPLES)?,
+        filter: read("--filter", args.filter.as_deref(), filter)?,
+        depth: ranged("--depth", args.depth, &limits::DEPTH)?,
+        seed: args.seed,
+        exposure: ranged("--exposure", args.exposure, &limits::EXPOSURE)?,
+        smooth_angle: ranged("--smooth-angle", args.smooth_angle, &limits::ANGLE)?,
+        aov: aov.transpose().map_err(|e| anyhow!("--aov: {e}"))?,
+        mtl_srgb: read("--mtl-color", args.mtl_color.as_deref(), is_srgb)?,
+        prune: ranged("--prune", args.prune, &limits::PRUNE)?,
+        materials: Vec::new(),
+    })
+}
+
+fn read<T>(option: &str, text: Option<&str>, from: impl Fn(&str) -> Result<T, String>) -> Result<Option<T>> {
+    text.map(|t| from(t).map_err(|e| anyhow!("{option}: {e}"))).transpose()
+}
+
+fn parsed<T: FromStr<Err = String>>(option: &str, text: Option<&str>) -> Result<Option<T>> {
+    read(option, text, str::parse)
+}
+
+fn ranged<T: Copy + Into<f64>>(option: &str, x: Option<T>, range: &RangeInclusive<f64>) -> Result<Option<T>> {
+    if let Some(x) = x {
+        within(x.into(), range).map_err(|e| anyhow!("{option}: {e}"))?;
+    }
+    Ok(x)
+}
+
+fn filter(word: &str) -> Result<Filter, String> {
+    match word {
+        "box" => Ok(Filter::Box),
+        "triangle" => Ok(Filter::Triangle),
+        "gaussian" => Ok(Filter::Gaussian),
+        _ => Err(format!("`{word}` is none of box, triangle, gaussian")),
+    }
+}
+
+fn is_srgb(word: &str) -> Result<bool, String> {
+    match word {
+        "linear" => Ok(false),
+        "srgb" => Ok(true),
+        _ => Err(format!("`{word}` is neither linear nor srgb")),
+    }
+}

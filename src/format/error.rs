@@ -1,0 +1,68 @@
+//! What stops a file from being read.
+
+use std::io;
+use std::path::PathBuf;
+use thiserror::Error;
+
+/// Why a file gives no scene. Each names the file, the line where there is one, the cause and the remedy.
+#[derive(Debug, Error)]
+pub enum FormatError {
+    /// The file or its folder cannot be read.
+    #[error("{}: cannot be read: {source}; check that it exists and that its permissions allow reading", path.display())]
+    Unreadable {
+        /// The file.
+        path: PathBuf,
+        /// What the system said.
+        source: io::Error,
+    },
+    /// A folder, a pipe or a device stands where a file should.
+    #[error("{}: is not a plain file; name an OBJ file", path.display())]
+    NotAFile {
+        /// What was named.
+        path: PathBuf,
+    },
+    /// The file is longer than its vertices and corners can be counted in 32 bits.
+    #[error("{}: has {bytes} bytes, more than the {limit} that one file may have; split it", path.display())]
+    TooLarge {
+        /// The file.
+        path: PathBuf,
+        /// Its length.
+        bytes: u64,
+        /// The greatest length.
+        limit: u64,
+    },
+    /// The placeholder that Git LFS leaves where a file was not fetched.
+    #[error("{}:1: is a Git LFS pointer, not the file itself; fetch it with `git lfs pull`", path.display())]
+    LfsPointer {
+        /// The file.
+        path: PathBuf,
+    },
+    /// Text in 16-bit units.
+    #[error("{}:1: is UTF-16 text; convert it, e.g. with `iconv -f UTF-16 -t UTF-8`", path.display())]
+    Utf16 {
+        /// The file.
+        path: PathBuf,
+    },
+    /// A face that cannot be what its author meant.
+    #[error("{}:{line}: {cause}; the frame is not rendered (--lenient drops the face)", path.display())]
+    BadFace {
+        /// The OBJ.
+        path: PathBuf,
+        /// Line of the face, from 1.
+        line: u32,
+        /// What is wrong with it.
+        cause: String,
+    },
+    /// A material override whose value the word cannot take.
+    #[error(
+        "material override `{name}`: `{word} {value}` is not understood; give what an MTL file may have there"
+    )]
+    BadOverride {
+        /// The material's name.
+        name: String,
+        /// The MTL word.
+        word: String,
+        /// The value.
+        value: String,
+    },
+}

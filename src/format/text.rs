@@ -1,0 +1,240 @@
+//! Lines, blanks, comments and names: what OBJ and MTL have in common as text. Names are bytes; nothing here asks
+//! for UTF-8.
+
+use super::error::FormatError;
+use memchr::memchr_iter;
+use std::borrow::Cow;
+use std::fs;
+use std::path::Path;
+
+/// The longest file that is read: what a line can name (corners, triangles, three normals each) then fits 32 bits.
+pub(crate) const MAX_FILE_BYTES: u64 = 1 << 31;
+
+/// Whether a byte parts two words.
+#[inline]
+pub(super) fn is_blank(byte: u8) -> bool {
+    matches!(byte, b' ' | b'\t' | 0x0b | 0x0c)
+}
+
+/// Whether a byte ends a line: LF, CR LF and a lone CR all do.
+#[inline]
+pub(super) fn is_line_end(byte: u8) -> bool {
+    matches!(byte, b'\n' | b'\r')
+}
+
+/// Whether a number ends before this byte. A comment may stand right behind it.
+#[inline]
+pub(super) fn ends_number(byte: u8) -> bool {
+    is_blank(byte) || is_line_end(byte) || byte == b'#'
+}
+
+/// Reads a plain file whole.
+pub(super) fn read(path: &Path) -> Result<Vec<u8>, FormatError> {
+    let unreadable = |source| FormatError::Unreadable { path: path.to_path_buf(), source };
+    let metadata = fs::metadata(path).map_err(unreadable)?;
+    // a pipe or a device could keep us waiting, or never end
+    if !metadata.is_file() {
+        return Err(FormatError::NotAFile { path: path.to_path_buf() });
+    }
+    within_limit(path, metadata.len())?;
+    let bytes = fs::read(path).map_err(unreadable)?;
+    within_limit(path, bytes.len() as u64)?;
+    Ok(bytes)
+}
+
+fn within_limit(path: &Path, bytes: u64) -> Result<(), FormatError> {
+    if bytes <= MAX_FILE_BYTES {
+        return Ok(());
+    }
+    Err(FormatError::TooLarge { path: path.to_path_buf(), bytes, limit: MAX_FILE_BYTES })
+}
+
+/// A text file in memory.
+pub(super) struct Text<'a> {
+    as_written: &'a [u8],
+    /// Its content with lines joined that `\` continues; as long as what was written, so that a place in one is
+    /// the same place in the other.
+    pub joined: Cow<'a, [u8]>,
+}
+
+impl<'a> Text<'a> {
+    /// Takes the bytes of a file, which must not be something else than text.
+    pub(super) fn new(bytes: &'a [u8], path: &Path) -> Result<Self, FormatError> {
+        within_limit(path, bytes.len() as u64)?;
+        if bytes.starts_with(b"version https://git-lfs") {
+            return Err(FormatError::LfsPointer { path: path.to_path_buf() });
+        }
+        if is_utf16(bytes) {
+            return Err(FormatError::Utf16 { path: path.to_path_buf() });
+        }
+        let as_written = bytes.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(bytes);
+        Ok(Self { as_written, joined: join_lines(as_written) })
+    }
+
+    /// The line, from 1, in which the byte at `offset` stands.
+    pub(super) fn line_at(&self, offset: usize) -> u32 {
+        let before = &self.as_written[..offset.min(self.as_written.len())];
+        let lone_returns =
+            memchr_iter(b'\r', before).filter(|&i| self.as_written.get(i + 1) != Some(&b'\n')).count();
+        (1 + memchr_iter(b'\n', before).count() + lone_returns) as u32
+    }
+}
+
+/// A byte-order mark, or every other of the first bytes zero.
+fn is_utf16(bytes: &[u8]) -> bool {
+    let zeros = |from: usize| {
+        let mut of_unit = bytes.iter().take(64).skip(from).step_by(2);
+        of_unit.len() >= 2 && of_unit.all(|&b| b == 0)
+    };
+    bytes.starts_with(b"\xFE\xFF") || bytes.starts_with(b"\xFF\xFE") || zeros(0) != zeros(1)
+}
+
+/// Blanks out each `\` at the end of a line together with that line end. A comment is not continued: paths of
+/// Windows stand there.
+fn join_lines(bytes: &[u8]) -> Cow<'_, [u8]> {
+    let mut joined = Cow::Borrowed(bytes);
+    let (mut seen, mut in_comment) = (0, false);
+    for at in memchr_iter(b'\\', bytes) {
+        let length = match bytes[at + 1..] {
+            [b'\r', b'\n', ..] => 3,
+            [b'\r' | b'\n', ..] => 2,
+            _ => continue,
+        };
+        let mut line = &bytes[seen..at];
+        if let Some(end) = line.iter().rposition(|&b| is_line_end(b)) {
+            line = &line[end + 1..];
+            in_comment = false;
+        }
+        in_comment |= without_comment(line).len() < line.len();
+        seen = at + 1;
+        if !in_comment {
+            joined.to_mut()[at..at + length].fill(b' ');
+            seen = at + length;
+        }
+    }
+    joined
+}
+
+/// Where the line that holds `from` ends: the place of its line end, or of the end of the text.
+#[inline]
+pub(super) fn line_end(text: &[u8], from: usize) -> usize {
+    let mut at = from;
+    // lines are short: eight bytes at a time, without a call
+    while let Some(chunk) = text[at..].first_chunk::<8>() {
+        let bytes = u64::from_le_bytes(*chunk);
+        let found = has_zero(bytes ^ 0x0A0A_0A0A_0A0A_0A0A) | has_zero(bytes ^ 0x0D0D_0D0D_0D0D_0D0D);
+        if found != 0 {
+            return at + (found.trailing_zeros() / 8) as usize;
+        }
+        at += 8;
+    }
+    text[at..].iter().position(|&b| is_line_end(b)).map_or(text.len(), |length| at + length)
+}
+
+/// The high bit of the first byte that is zero, if one is (and maybe bits behind it).
+#[inline]
+fn has_zero(bytes: u64) -> u64 {
+    bytes.wrapping_sub(0x0101_0101_0101_0101) & !bytes & 0x8080_8080_8080_8080
+}
+
+/// A line without its comment: `#` opens one at the start of the line or behind a blank.
+pub(super) fn without_comment(line: &[u8]) -> &[u8] {
+    let comment = memchr_iter(b'#', line).find(|&i| i == 0 || is_blank(line[i - 1]));
+    &line[..comment.unwrap_or(line.len())]
+}
+
+/// Without the blanks at both ends.
+pub(super) fn trimmed(mut text: &[u8]) -> &[u8] {
+    while let [first, rest @ ..] = text
+        && is_blank(*first)
+    {
+        text = rest;
+    }
+    while let [rest @ .., last] = text
+        && is_blank(*last)
+    {
+        text = rest;
+    }
+    text
+}
+
+/// The first word and what follows it, trimmed.
+pub(super) fn first_word(line: &[u8]) -> (&[u8], &[u8]) {
+    let line = trimmed(line);
+    let end = line.iter().position(|&b| is_blank(b)).unwrap_or(line.len());
+    (&line[..end], trimmed(&line[end..]))
+}
+
+/// The words between blanks.
+pub(super) fn words(line: &[u8]) -> impl Iterator<Item = &[u8]> {
+    line.split(|&b| is_blank(b)).filter(|word| !word.is_empty())
+}
+
+/// How often something was met, and where first.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Tally {
+    /// How often.
+    pub count: u64,
+    /// Place in the text of the first.
+    pub first: usize,
+}
+
+impl Tally {
+    /// Counts one more, at `offset`.
+    pub(super) fn add(&mut self, offset: usize) {
+        if self.count == 0 {
+            self.first = offset;
+        }
+        self.count += 1;
+    }
+}
+
+/// Bytes for people to read.
+pub(super) fn shown(bytes: &[u8]) -> Cow<'_, str> {
+    String::from_utf8_lossy(bytes)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn text(bytes: &[u8]) -> Text<'_> {
+        Text::new(bytes, Path::new("a.obj")).unwrap()
+    }
+
+    #[test]
+    fn lines_are_counted_whatever_ends_them() {
+        let t = text(b"a\nb\r\nc\rd");
+        let lines: Vec<u32> = [0, 2, 5, 7].map(|offset| t.line_at(offset)).to_vec();
+        assert_eq!(lines, [1, 2, 3, 4]);
+    }
+
+    #[test]
+    fn a_backslash_joins_lines_but_not_comments() {
+        let joined = |bytes: &'static [u8]| text(bytes).joined.into_owned();
+        assert_eq!(joined(b"f 1 \\\n2 3\n"), b"f 1   2 3\n");
+        assert_eq!(joined(b"f 1 \\\r\n2\\\r3\n"), b"f 1    2  3\n");
+        assert_eq!(joined(b"# C:\\out\\\nv 1 2 3\n"), b"# C:\\out\\\nv 1 2 3\n");
+        assert_eq!(joined(b"map_Kd a\\b.png\n"), b"map_Kd a\\b.png\n");
+        assert_eq!(text(b"f 1 \\\n2 3\nf").line_at(10), 3, "lines are those of the file");
+    }
+
+    #[test]
+    fn what_is_no_text_is_named() {
+        let refused = |bytes: &[u8]| Text::new(bytes, Path::new("a.obj")).err().map(|e| e.to_string());
+        assert!(refused(b"version https://git-lfs.github.com/spec/v1\n").unwrap().contains("Git LFS"));
+        for utf16 in [&b"\xFE\xFF\0v"[..], b"\xFF\xFEv\0", b"\0v\0 \0\x31", b"v\0 \0\x31\0"] {
+            assert!(refused(utf16).unwrap().contains("UTF-16"));
+        }
+        for plain in [&b""[..], b"v", b"\xEF\xBB\xBFv 1 2 3", b"o \xE6\n", b"\0\0\0\0\0\0"] {
+            assert_eq!(refused(plain), None);
+        }
+    }
+
+    #[test]
+    fn a_comment_needs_a_blank_before_it() {
+        assert_eq!(without_comment(b"usemtl red#2 # the second"), b"usemtl red#2 ");
+        assert_eq!(without_comment(b"# all"), b"");
+        assert_eq!(first_word(b"  usemtl \t a  b "), (&b"usemtl"[..], &b"a  b"[..]));
+    }
+}

@@ -1,0 +1,313 @@
+//! INPUT to sequences of files: folders, patterns, files (CONTRACT 2).
+
+use super::JobError;
+use super::names::{Name, group};
+use crate::warning::Warnings;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+/// A file that is one frame of a layer.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct FrameFile {
+    /// Its number in the file name, if it has one.
+    pub number: Option<i64>,
+    /// Where it is.
+    pub path: PathBuf,
+    /// Its name without extension.
+    pub stem: String,
+}
+
+/// Files that are frames of one sequence, ordered by number.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) struct Files {
+    /// What their names have in common, else the folder's name.
+    pub(super) name: String,
+    pub(super) files: Vec<FrameFile>,
+}
+
+/// How folders are taken.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Taking {
+    /// All files of an INPUT are one sequence, in natural order, numbered from 1.
+    pub(super) one_sequence: bool,
+    /// Gaps are errors.
+    pub(super) strict: bool,
+}
+
+/// Finds the sequences of an INPUT.
+pub(super) fn discover(
+    input: &Path,
+    taking: Taking,
+    warnings: &mut Warnings,
+) -> Result<Vec<Files>, JobError> {
+    let found = if input.is_dir() {
+        let files = list(input, &|name| is_obj(Path::new(name)))?;
+        if files.is_empty() {
+            return Err(if list(input, &|n| is_gltf(Path::new(n))).is_ok_and(|f| !f.is_empty()) {
+                JobError::Gltf(input.to_path_buf())
+            } else {
+                JobError::NoFrames(input.to_path_buf())
+            });
+        }
+        files
+    } else if input.exists() {
+        if is_gltf(input) {
+            return Err(JobError::Gltf(input.to_path_buf()));
+        }
+        if !is_obj(input) {
+            return Err(JobError::NotAnInput(input.to_path_buf()));
+        }
+        vec![input.to_path_buf()]
+    } else if let Some(pattern) = Pattern::of(input) {
+        let folder = input.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+        let files =
+            list(folder, &|name| is_obj(Path::new(name)) && pattern.matches(name.as_encoded_bytes()))?;
+        if files.is_empty() {
+            return Err(JobError::NoMatch(input.to_path_buf()));
+        }
+        files
+    } else {
+        return Err(JobError::Absent(input.to_path_buf()));
+    };
+    let names: Vec<Name> = found.iter().map(|f| Name::of(stem_bytes(f))).collect();
+    let folder_name = folder_name(input);
+    let sequences = if taking.one_sequence {
+        vec![in_natural_order(&found, &names, folder_name)]
+    } else {
+        group(&names)
+            .into_iter()
+            .map(|g| Files {
+                name: if g.text.chars().any(char::is_alphabetic) { g.text } else { folder_name.clone() },
+                files: g.members.iter().map(|&(number, i)| frame_file(number, &found[i])).collect(),
+            })
+            .collect()
+    };
+    for sequence in &sequences {
+        check_numbers(sequence, input, taking.strict, warnings)?;
+    }
+    Ok(sequences)
+}
+
+fn in_natural_order(found: &[PathBuf], names: &[Name], name: String) -> Files {
+    let mut order: Vec<usize> = (0..found.len()).collect();
+    order.sort_by(|&a, &b| names[a].natural_order(&names[b]).then_with(|| found[a].cmp(&found[b])));
+    let files = (1..).zip(order).map(|(number, i)| frame_file(Some(number), &found[i])).collect();
+    Files { name, files }
+}
+
+fn frame_file(number: Option<i64>, path: &Path) -> FrameFile {
+    FrameFile {
+        number,
+        path: path.to_path_buf(),
+        stem: String::from_utf8_lossy(stem_bytes(path)).into_owned(),
+    }
+}
+
+fn stem_bytes(path: &Path) -> &[u8] {
+    path.file_stem().unwrap_or_default().as_encoded_bytes()
+}
+
+/// The name of the folder that an INPUT is or lies in.
+pub(super) fn folder_name(input: &Path) -> String {
+    let folder = if input.is_dir() { Some(input) } else { input.parent() };
+    let real = folder
+        .map(|f| if f.as_os_str().is_empty() { Path::new(".") } else { f })
+        .and_then(|f| f.canonicalize().ok());
+    let name = real.as_deref().and_then(Path::file_name).map(|n| n.to_string_lossy().into_owned());
+    name.unwrap_or_else(|| "sequence".to_string())
+}
+
+fn is_obj(path: &Path) -> bool {
+    path.extension().is_some_and(|e| e.eq_ignore_ascii_case("obj"))
+}
+
+fn is_gltf(path: &Path) -> bool {
+    path.extension().is_some_and(|e| e.eq_ignore_ascii_case("gltf") || e.eq_ignore_ascii_case("glb"))
+}
+
+/// The plain files of a folder (links to files too) whose names are wanted, hidden ones left out, sorted by name.
+fn list(folder: &Path, wanted: &dyn Fn(&std::ffi::OsStr) -> bool) -> Result<Vec<PathBuf>, JobError> {
+    let unreadable = |source| JobError::Unreadable { path: folder.to_path_buf(), source };
+    let mut files = Vec::new();
+    for entry in fs::read_dir(folder).map_err(unreadable)? {
+        let entry = entry.map_err(unreadable)?;
+        let name = entry.file_name();
+        let is_hidden = name.as_encoded_bytes().first() == Some(&b'.');
+        if !is_hidden && wanted(&name) && !entry.path().is_dir() {
+            files.push(entry.path());
+        }
+    }
+    files.sort();
+    Ok(files)
+}
+
+/// Two files of one number are an error, gaps a warning; with strict an error.
+fn check_numbers(
+    sequence: &Files,
+    input: &Path,
+    strict: bool,
+    warnings: &mut Warnings,
+) -> Result<(), JobError> {
+    let numbers: Vec<i64> = sequence.files.iter().filter_map(|f| f.number).collect();
+    if let Some(i) = numbers.windows(2).position(|w| w[0] == w[1]) {
+        let name = |k: usize| sequence.files[k].path.clone();
+        return Err(JobError::TwoOfANumber { number: numbers[i], first: name(i), second: name(i + 1) });
+    }
+    // a simulation that writes every tenth step has no gaps
+    let step = numbers.windows(2).fold(0, |step, w| gcd(step, w[1] - w[0]));
+    let gaps: Vec<String> = numbers
+        .windows(2)
+        .filter(|w| w[1] - w[0] > step)
+        .map(|w| match (w[0] + step, w[1] - step) {
+            (a, b) if a == b => a.to_string(),
+            (a, b) => format!("{a}-{b}"),
+        })
+        .collect();
+    if gaps.is_empty() {
+        return Ok(());
+    }
+    let shown = gaps.iter().take(8).cloned().collect::<Vec<_>>().join(", ");
+    let more = if gaps.len() > 8 { format!(" and {} more gaps", gaps.len() - 8) } else { String::new() };
+    let text = format!("frames {shown}{more} of sequence {} are missing", sequence.name);
+    if strict {
+        return Err(JobError::Gaps { input: input.to_path_buf(), text });
+    }
+    warnings.add(Some(input), None, text);
+    Ok(())
+}
+
+fn gcd(a: i64, b: i64) -> i64 {
+    if b == 0 { a } else { gcd(b, a % b) }
+}
+
+/// Whether a text matches a pattern of `*`, `?`, `#` and `%d`.
+pub(super) fn glob(pattern: &str, text: &str) -> bool {
+    match Pattern::of(Path::new(pattern)) {
+        Some(pattern) => pattern.matches(text.as_bytes()),
+        None => pattern == text,
+    }
+}
+
+/// A pattern for file names: `####` and `%04d` are numbers of at least that many digits, `%d` any number, `*` any
+/// text, `?` any byte.
+struct Pattern(Vec<Piece>);
+
+enum Piece {
+    Byte(u8),
+    Any,
+    AnyByte,
+    Number { digits: usize },
+}
+
+impl Pattern {
+    /// The pattern in the last part of a path, if there is one.
+    fn of(path: &Path) -> Option<Self> {
+        let name = path.file_name()?.as_encoded_bytes();
+        let mut pieces = Vec::new();
+        let mut i = 0;
+        while i < name.len() {
+            let rest = &name[i..];
+            let (piece, length) = match rest[0] {
+                b'*' => (Piece::Any, 1),
+                b'?' => (Piece::AnyByte, 1),
+                b'#' => {
+                    let digits = rest.iter().take_while(|b| **b == b'#').count();
+                    (Piece::Number { digits }, digits)
+                }
+                b'%' => {
+                    let width = rest[1..].iter().take_while(|b| b.is_ascii_digit()).count();
+                    if rest.get(1 + width) == Some(&b'd') {
+                        let digits =
+                            rest[1..=width].iter().fold(0, |n, b| (n * 10 + usize::from(b - b'0')).min(99));
+                        (Piece::Number { digits: digits.max(1) }, width + 2)
+                    } else {
+                        (Piece::Byte(b'%'), 1)
+                    }
+                }
+                byte => (Piece::Byte(byte), 1),
+            };
+            pieces.push(piece);
+            i += length;
+        }
+        let is_pattern = pieces.iter().any(|p| !matches!(p, Piece::Byte(_)));
+        is_pattern.then_some(Self(pieces))
+    }
+
+    fn matches(&self, name: &[u8]) -> bool {
+        matches(&self.0, name)
+    }
+}
+
+fn matches(pieces: &[Piece], name: &[u8]) -> bool {
+    let Some((piece, pieces)) = pieces.split_first() else { return name.is_empty() };
+    match piece {
+        Piece::Byte(b) => name.first() == Some(b) && matches(pieces, &name[1..]),
+        Piece::AnyByte => !name.is_empty() && matches(pieces, &name[1..]),
+        Piece::Any => (0..=name.len()).any(|i| matches(pieces, &name[i..])),
+        Piece::Number { digits } => {
+            let length = name.iter().take_while(|b| b.is_ascii_digit()).count();
+            length >= *digits && matches(pieces, &name[length..])
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const TAKING: Taking = Taking { one_sequence: false, strict: false };
+
+    fn folder(names: &[&str]) -> tempfile::TempDir {
+        let t = tempfile::tempdir().unwrap();
+        for name in names {
+            fs::write(t.path().join(name), "").unwrap();
+        }
+        t
+    }
+
+    fn numbers(input: &Path, taking: Taking) -> Vec<Vec<Option<i64>>> {
+        let found = discover(input, taking, &mut Warnings::default()).unwrap();
+        found.iter().map(|s| s.files.iter().map(|f| f.number).collect()).collect()
+    }
+
+    #[test]
+    fn folders_and_patterns() {
+        let t = folder(&["w_1.obj", "w_2.OBJ", "w_10.obj", ".w_3.obj", "notes.txt", "x.mtl"]);
+        let all = vec![vec![Some(1), Some(2), Some(10)]];
+        assert_eq!(numbers(t.path(), TAKING), all);
+        assert_eq!(numbers(&t.path().join("*.obj"), TAKING), [[Some(1), Some(10)]]);
+        assert_eq!(numbers(&t.path().join("w_##.obj"), TAKING), [[Some(10)]]);
+        assert_eq!(numbers(&t.path().join("w_%d.obj"), TAKING), [[Some(1), Some(10)]]);
+        assert_eq!(numbers(&t.path().join("w_%02d.obj"), TAKING), [[Some(10)]]);
+        let one = Taking { one_sequence: true, ..TAKING };
+        assert_eq!(numbers(t.path(), one), [[Some(1), Some(2), Some(3)]]);
+        let Err(JobError::NoMatch(_)) = discover(&t.path().join("y_#.obj"), TAKING, &mut Warnings::default())
+        else {
+            panic!("a pattern that matches nothing")
+        };
+    }
+
+    #[test]
+    fn gaps_are_told_and_doubles_refused() {
+        let t = folder(&["w_1.obj", "w_2.obj", "w_4.obj", "w_9.obj"]);
+        let mut warnings = Warnings::default();
+        discover(t.path(), TAKING, &mut warnings).unwrap();
+        assert!(warnings.list()[0].text.contains("frames 3, 5-8 "), "{:?}", warnings.list());
+        let strict = Taking { strict: true, ..TAKING };
+        assert!(matches!(discover(t.path(), strict, &mut warnings), Err(JobError::Gaps { .. })));
+        let every_tenth = folder(&["w_10.obj", "w_20.obj", "w_30.obj"]);
+        assert!(discover(every_tenth.path(), strict, &mut warnings).is_ok());
+        let t = folder(&["w_7.obj", "w_0007.obj", "w_8.obj"]);
+        let error = discover(t.path(), TAKING, &mut warnings).unwrap_err().to_string();
+        assert!(error.contains("w_7.obj") && error.contains("w_0007.obj"), "{error}");
+    }
+
+    #[test]
+    fn what_is_no_input_is_named() {
+        let t = folder(&["a.txt"]);
+        let error = |p: &Path| discover(p, TAKING, &mut Warnings::default()).unwrap_err().to_string();
+        assert!(error(t.path()).contains("no .obj"), "{}", error(t.path()));
+        assert!(error(&t.path().join("a.txt")).contains("a.txt"));
+        assert!(error(&t.path().join("absent")).contains("absent"));
+    }
+}

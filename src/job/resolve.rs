@@ -1,0 +1,319 @@
+//! From what was asked for to the list of pictures.
+
+use super::discover::{self, Files, Taking};
+use super::file::{self, JobFile, LayerFile, Outside, Override};
+use super::template::{Fill, fill};
+use super::{FrameFile, FrameSet, Job, JobError, Layer, Picture, Request, Sequence, Settings, Source};
+use crate::warning::Warnings;
+use std::collections::{HashMap, HashSet};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+/// Works out what is to be rendered; nothing is written.
+pub fn resolve(request: &Request) -> Result<Job, JobError> {
+    let mut job = Resolving {
+        request,
+        warnings: Warnings::default(),
+        inputs: Vec::new(),
+        sequences: Vec::new(),
+        pictures: Vec::new(),
+        shared: None,
+    };
+    let (files, inputs): (Vec<&PathBuf>, Vec<&PathBuf>) =
+        request.inputs.iter().chain(&request.job_file).partition(|i| is_job_file(i));
+    let job_file = match files.as_slice() {
+        [] => JobFile::default(),
+        [path] => {
+            job.inputs.push((*path).clone());
+            file::read(path)?
+        }
+        _ => {
+            return Err(JobError::Options(
+                "more than one job file; render them one after the other".to_string(),
+            ));
+        }
+    };
+    if inputs.is_empty() && files.is_empty() {
+        return Err(JobError::NoInput);
+    }
+    if !inputs.is_empty() && !job_file.layers.is_empty() {
+        return Err(JobError::Options("a job with layers takes no other INPUT".to_string()));
+    }
+
+    let stem = files.first().map(|p| p.file_stem().unwrap_or_default().to_string_lossy().into_owned());
+    let mut name = job_file.name.clone().or(stem);
+    if job_file.layers.is_empty() {
+        let own: Vec<&PathBuf> = job_file.sequence.iter().collect();
+        for input in if inputs.is_empty() { own } else { inputs } {
+            let sequences = discover::discover(input, job.taking(), &mut job.warnings)?;
+            let default =
+                if input.is_dir() { discover::folder_name(input) } else { sequences[0].name.clone() };
+            let name = name.get_or_insert(default);
+            for files in sequences {
+                job.add_sequence(name, files, &job_file)?;
+            }
+        }
+    } else {
+        job.add_layers(name.as_deref().unwrap_or("layers"), &job_file)?;
+    }
+    let name = name.unwrap_or_default();
+
+    job.place_in_folders()?;
+    job.choose(job_file.frames.as_ref())?;
+    job.inputs.extend(
+        job.sequences
+            .iter()
+            .flat_map(|s| &s.layers)
+            .flat_map(|l| l.files.iter().map(|f| f.path.clone()).chain(l.materials.clone()))
+            .collect::<Vec<_>>(),
+    );
+    let folder = request.folder.clone().or(job_file.folder).unwrap_or_else(|| Path::new("out").join(&name));
+    Ok(Job {
+        name,
+        folder,
+        sequences: job.sequences,
+        pictures: job.pictures,
+        inputs: job.inputs,
+        warnings: job.warnings,
+    })
+}
+
+/// No job of layers has more pictures.
+const MAX_FRAMES: u64 = 1_000_000;
+
+fn is_job_file(path: &Path) -> bool {
+    path.extension().is_some_and(|e| e.eq_ignore_ascii_case("yaml") || e.eq_ignore_ascii_case("yml"))
+}
+
+struct Resolving<'a> {
+    request: &'a Request,
+    warnings: Warnings,
+    inputs: Vec<PathBuf>,
+    sequences: Vec<Sequence>,
+    pictures: Vec<Picture>,
+    /// The settings of all pictures where no override tells them apart.
+    shared: Option<Arc<Settings>>,
+}
+
+impl Resolving<'_> {
+    fn taking(&self) -> Taking {
+        Taking { one_sequence: self.request.one_sequence, strict: self.request.strict }
+    }
+
+    /// A sequence of one layer: a picture for each of its files.
+    fn add_sequence(&mut self, job_name: &str, files: Files, job: &JobFile) -> Result<(), JobError> {
+        let sequence = self.sequences.len();
+        let layer = Layer { name: files.name.clone(), files: files.files, materials: None, placed: None };
+        let mut pictures = Vec::new();
+        for (i, file) in layer.files.iter().enumerate() {
+            let sources = vec![Source { layer: 0, file: Some(i), transform: None }];
+            let settings = self.settings(job, file.number, Some(&file.stem))?;
+            let with = Fill { stem: &file.stem, name: job_name, frame: file.number };
+            let picture = picture_path(&settings, "{stem}", with)?;
+            pictures.push(Picture { sequence, frame: file.number, sources, picture, settings });
+        }
+        self.add(files.name, vec![layer], pictures)
+    }
+
+    /// All layers in one sequence: a picture for each frame of the job, else of the longest layer.
+    fn add_layers(&mut self, job_name: &str, job: &JobFile) -> Result<(), JobError> {
+        let mut layers = Vec::new();
+        for given in &job.layers {
+            let mut found = discover::discover(&given.sequence, self.taking(), &mut self.warnings)?;
+            if found.len() > 1 {
+                let text = format!(
+                    "layer {} holds {} sequences; name one by a pattern",
+                    given.sequence.display(),
+                    found.len()
+                );
+                return Err(JobError::Options(text));
+            }
+            let files = found.remove(0);
+            let name = given.name.clone().unwrap_or(files.name);
+            layers.push(Layer {
+                name,
+                files: files.files,
+                materials: given.materials.clone(),
+                placed: given.placed.clone(),
+            });
+        }
+        if job.frames.as_ref().is_some_and(|set| set.len() > MAX_FRAMES) {
+            return Err(JobError::Options(format!(
+                "the job asks for more than {MAX_FRAMES} frames; split it"
+            )));
+        }
+        let frames = layer_frames(&layers, job);
+        let first = frames.first().copied().unwrap_or(1);
+        let mut pictures = Vec::new();
+        for frame in frames {
+            let sources: Vec<Source> = layers
+                .iter()
+                .zip(&job.layers)
+                .enumerate()
+                .map(|(layer, (l, given))| Source {
+                    layer,
+                    file: layer_file(&l.files, given, frame - first),
+                    transform: l.placed.as_ref().map(|p| p.at(frame as f64)),
+                })
+                .collect();
+            let settings = self.settings(job, Some(frame), None)?;
+            let with = Fill { stem: job_name, name: job_name, frame: Some(frame) };
+            let picture = picture_path(&settings, "{name}_{frame:04}", with)?;
+            pictures.push(Picture { sequence: 0, frame: Some(frame), sources, picture, settings });
+        }
+        self.add(job_name.to_string(), layers, pictures)
+    }
+
+    fn add(&mut self, name: String, layers: Vec<Layer>, pictures: Vec<Picture>) -> Result<(), JobError> {
+        let mut seen = HashSet::new();
+        if let Some(twice) = pictures.iter().find(|p| !seen.insert(&p.picture)) {
+            return Err(JobError::TwoOfAName(twice.picture.clone()));
+        }
+        if let Some(first) = pictures.first().cloned() {
+            self.sequences.push(Sequence { name, layers, first });
+            self.pictures.extend(pictures);
+        }
+        Ok(())
+    }
+
+    /// Defaults, then the job, then its overrides in turn, then the command line.
+    fn settings(
+        &mut self,
+        job: &JobFile,
+        frame: Option<i64>,
+        stem: Option<&str>,
+    ) -> Result<Arc<Settings>, JobError> {
+        if let Some(shared) = &self.shared {
+            return Ok(Arc::clone(shared));
+        }
+        let mut options = job.options.clone();
+        for o in job.overrides.iter().filter(|o| applies(o, frame, stem)) {
+            options.lay_over(&o.options);
+        }
+        options.lay_over(&self.request.options);
+        let settings = Settings::new(&options).map(Arc::new).map_err(JobError::Options)?;
+        if job.overrides.is_empty() {
+            self.shared = Some(Arc::clone(&settings));
+        }
+        Ok(settings)
+    }
+
+    /// Where several sequences would write one name, each gets a folder of its own.
+    fn place_in_folders(&mut self) -> Result<(), JobError> {
+        let mut owner: HashMap<&Path, usize> = HashMap::new();
+        let clash =
+            self.pictures.iter().any(|p| *owner.entry(&p.picture).or_insert(p.sequence) != p.sequence);
+        if !clash {
+            return Ok(());
+        }
+        let mut taken: HashSet<String> = HashSet::new();
+        let folders: Vec<String> = self
+            .sequences
+            .iter()
+            .map(|s| {
+                let names = std::iter::once(s.name.clone()).chain((2..).map(|i| format!("{}-{i}", s.name)));
+                // the iterator has no end
+                names.into_iter().find(|n| taken.insert(n.clone())).unwrap_or_default()
+            })
+            .collect();
+        for p in &mut self.pictures {
+            p.picture = Path::new(&folders[p.sequence]).join(&p.picture);
+        }
+        let mut seen = HashSet::new();
+        match self.pictures.iter().find(|p| !seen.insert(&p.picture)) {
+            Some(twice) => Err(JobError::TwoOfAName(twice.picture.clone())),
+            None => Ok(()),
+        }
+    }
+
+    /// `--frames`, then `--chunk`, then `--order`.
+    fn choose(&mut self, of_job: Option<&FrameSet>) -> Result<(), JobError> {
+        for set in [of_job, self.request.frames.as_ref()].into_iter().flatten() {
+            let mut numbers: Vec<i64> = self.pictures.iter().filter_map(|p| p.frame).collect();
+            numbers.sort_unstable();
+            if let Some(missing) = set.first_not_in(&numbers) {
+                return Err(JobError::NoSuchFrame(missing));
+            }
+            self.pictures.retain(|p| p.frame.is_some_and(|f| set.contains(f)));
+        }
+        if let Some(chunk) = self.request.chunk {
+            self.pictures = self.pictures[chunk.range(self.pictures.len())].to_vec();
+        }
+        self.request.order.apply(&mut self.pictures);
+        Ok(())
+    }
+}
+
+fn applies(o: &Override, frame: Option<i64>, stem: Option<&str>) -> bool {
+    o.frames.as_ref().is_none_or(|set| frame.is_some_and(|f| set.contains(f)))
+        && o.files.as_ref().is_none_or(|pattern| stem.is_some_and(|s| discover::glob(pattern, s)))
+}
+
+fn picture_path(settings: &Settings, default: &str, with: Fill<'_>) -> Result<PathBuf, JobError> {
+    let template = settings.name.as_deref().unwrap_or(default);
+    let name = fill(template, with).map_err(JobError::Options)?;
+    Ok(PathBuf::from(format!("{name}.{}", settings.format)))
+}
+
+/// The frames of a job with layers: those it names, else those of the longest layer (or 1 where it has no number).
+fn layer_frames(layers: &[Layer], job: &JobFile) -> Vec<i64> {
+    let longest = layers.iter().max_by_key(|l| l.files.len());
+    let (first, last) = longest.map_or((1, 1), |l| {
+        let first = l.files.first().and_then(|f| f.number).unwrap_or(1);
+        (first, l.files.last().and_then(|f| f.number).unwrap_or(first))
+    });
+    match &job.frames {
+        Some(set) => set.iter().collect(),
+        None => (first..=last).collect(),
+    }
+}
+
+/// The file that a layer shows so many frames after the job's first one (CONTRACT 3: start + step · offset, in a gap
+/// the last one before).
+fn layer_file(files: &[FrameFile], given: &LayerFile, offset: i64) -> Option<usize> {
+    let first = files.first()?.number.unwrap_or(0);
+    let last = files.last()?.number.unwrap_or(0);
+    let mut number = given.start.unwrap_or(first).saturating_add(given.step.saturating_mul(offset));
+    if !(first..=last).contains(&number) {
+        number = match given.outside {
+            Outside::Hold => number.clamp(first, last),
+            Outside::Loop => first + (number - first).rem_euclid(last - first + 1),
+            Outside::Hide => return None,
+        };
+    }
+    files.iter().rposition(|f| f.number.unwrap_or(0) <= number)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn layer(step: i64, outside: Outside) -> LayerFile {
+        LayerFile {
+            sequence: PathBuf::new(),
+            name: None,
+            placed: None,
+            start: None,
+            step,
+            outside,
+            materials: None,
+        }
+    }
+
+    fn shown(given: &LayerFile) -> Vec<Option<usize>> {
+        let file = |n| FrameFile { number: Some(n), path: PathBuf::new(), stem: String::new() };
+        // frame 12 is missing
+        let files = [file(10), file(11), file(13)];
+        (-1..6).map(|offset| layer_file(&files, given, offset)).collect()
+    }
+
+    #[test]
+    fn layers_hold_loop_or_hide() {
+        assert_eq!(shown(&layer(1, Outside::Hold)), [0, 0, 1, 1, 2, 2, 2].map(Some));
+        assert_eq!(shown(&layer(1, Outside::Loop)), [2, 0, 1, 1, 2, 0, 1].map(Some));
+        assert_eq!(shown(&layer(1, Outside::Hide)), [None, Some(0), Some(1), Some(1), Some(2), None, None]);
+        assert_eq!(shown(&layer(2, Outside::Hold)), [0, 0, 1, 2, 2, 2, 2].map(Some));
+        let later = LayerFile { start: Some(13), ..layer(-1, Outside::Hold) };
+        assert_eq!(shown(&later), [2, 2, 1, 1, 0, 0, 0].map(Some));
+    }
+}

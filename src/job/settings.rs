@@ -1,0 +1,274 @@
+//! The settings of one picture: every option with its default filled in.
+
+use super::options::{CameraChoice, LightChoice, Options, limits};
+use super::track::{CameraPose, CameraTrack, Interpolation, Key};
+use crate::format::ReadOptions;
+use crate::math::{DVec3, Vec3};
+use crate::scene::{Aov, AovSet, Camera, Filter, Light, Shot};
+
+/// Picture formats of this version, by their words.
+pub const FORMATS: [&str; 3] = ["png", "exr", "ppm"];
+
+/// Everything that bears on one picture but its geometry.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Settings {
+    /// Where the camera comes from.
+    pub camera: CameraChoice,
+    /// Where the lights come from.
+    pub lights: LightChoice,
+    /// What is up.
+    pub up: DVec3,
+    /// Vertical field of view, degrees.
+    pub fov_deg: f64,
+    /// Ambient light.
+    pub ambient: Vec3,
+    /// Background colour.
+    pub background: Vec3,
+    /// Width and height, pixels.
+    pub size: [u32; 2],
+    /// Samples a pixel.
+    pub samples: u32,
+    /// Pixel filter.
+    pub filter: Filter,
+    /// Bounces.
+    pub depth: u32,
+    /// Seed of the samples.
+    pub seed: u32,
+    /// Least weight of a ray.
+    pub prune: f32,
+    /// Whether the background is left out.
+    pub alpha: bool,
+    /// Auxiliary pictures.
+    pub aovs: AovSet,
+    /// Picture format, one of [`FORMATS`].
+    pub format: String,
+    /// Bits a channel.
+    pub bits: u8,
+    /// Quality of jpg.
+    pub quality: u8,
+    /// Stops of exposure.
+    pub exposure_stops: f32,
+    /// Template of the picture's name, where one is given.
+    pub name: Option<String>,
+    /// How files are read.
+    pub read: ReadOptions,
+}
+
+impl Settings {
+    /// Fills in what the options leave open.
+    pub fn new(options: &Options) -> Result<Self, String> {
+        let o = options.clone();
+        let read = ReadOptions {
+            smooth_angle_deg: o.smooth_angle,
+            mtl_srgb: o.mtl_srgb.unwrap_or(false),
+            material_overrides: o.materials.clone(),
+            ..ReadOptions::default()
+        };
+        Ok(Self {
+            camera: camera(&o)?,
+            lights: o.lights.unwrap_or(LightChoice::Auto),
+            up: o.up.unwrap_or(DVec3::Y),
+            fov_deg: o.fov.unwrap_or(40.0),
+            ambient: o.ambient.unwrap_or(Vec3::splat(0.1)),
+            background: o.background.unwrap_or(Vec3::ZERO),
+            size: o.size.unwrap_or([1280, 720]),
+            samples: o.samples.unwrap_or(1),
+            filter: o.filter.unwrap_or_default(),
+            depth: o.depth.unwrap_or(10),
+            seed: o.seed.unwrap_or(0),
+            prune: o.prune.unwrap_or(1.0 / 4096.0),
+            alpha: o.alpha.unwrap_or(false),
+            aovs: o.aov.unwrap_or_default(),
+            format: o.format.unwrap_or_else(|| FORMATS[0].to_string()),
+            bits: o.bits.unwrap_or(8),
+            quality: o.quality.unwrap_or(92),
+            exposure_stops: o.exposure.unwrap_or(0.0),
+            name: o.name,
+            read,
+        })
+    }
+
+    /// The shot of a frame with the camera and lights that were found for it.
+    pub fn shot(&self, camera: Camera, lights: Vec<Light>) -> Shot {
+        Shot {
+            camera,
+            lights,
+            ambient: self.ambient,
+            background: self.background,
+            size: self.size,
+            samples: self.samples,
+            filter: self.filter,
+            depth: self.depth,
+            seed: self.seed,
+            prune: self.prune,
+            alpha: self.alpha,
+            aovs: self.aovs,
+        }
+    }
+
+    /// The camera at a frame, where it is given; None: auto. A number that a frame does not have counts as 0.
+    pub fn camera_at(&self, frame: Option<i64>) -> Option<Camera> {
+        match &self.camera {
+            CameraChoice::Auto => None,
+            CameraChoice::Given(track) => track.at(frame.unwrap_or(0) as f64, self.up, self.fov_deg),
+        }
+    }
+
+    /// Width over height.
+    pub fn aspect(&self) -> f64 {
+        f64::from(self.size[0]) / f64::from(self.size[1])
+    }
+}
+
+/// The camera with what was given apart from it (`--eye`, `--look-at`, `--up`, `--fov`) laid over.
+fn camera(o: &Options) -> Result<CameraChoice, String> {
+    let mut choice = o.camera.clone().unwrap_or(CameraChoice::Auto);
+    match &mut choice {
+        CameraChoice::Auto => match (o.eye, o.look_at) {
+            (None, None) => return Ok(CameraChoice::Auto),
+            (Some(eye), Some(look_at)) => {
+                let value = CameraPose { eye, look_at, up: None, fov_deg: None };
+                let keys = vec![Key { frame: 0.0, value }];
+                choice = CameraChoice::Given(CameraTrack { keys, interpolation: Interpolation::Linear });
+            }
+            (Some(_), None) => return Err("--eye needs --look-at beside it".to_string()),
+            (None, Some(_)) => return Err("--look-at needs --eye beside it".to_string()),
+        },
+        CameraChoice::Given(track) => {
+            for key in &mut track.keys {
+                key.value.eye = o.eye.unwrap_or(key.value.eye);
+                key.value.look_at = o.look_at.unwrap_or(key.value.look_at);
+            }
+        }
+    }
+    if let CameraChoice::Given(track) = &choice
+        && track.keys.iter().any(|k| k.value.eye == k.value.look_at)
+    {
+        return Err("eye and look-at are the same point".to_string());
+    }
+    Ok(choice)
+}
+
+/// The word of a picture format, if there is such a one.
+pub fn format_word(word: &str) -> Result<String, String> {
+    let lower = word.to_ascii_lowercase();
+    if FORMATS.contains(&lower.as_str()) {
+        Ok(lower)
+    } else {
+        Err(format!("there is no picture format `{word}`; there are {}", FORMATS.join(", ")))
+    }
+}
+
+/// Bits a channel.
+pub fn bits(x: f64) -> Result<u8, String> {
+    if x == 8.0 || x == 16.0 { Ok(x as u8) } else { Err(format!("bits are 8 or 16, not {x}")) }
+}
+
+/// Auxiliary pictures by their words.
+pub fn aovs<'a>(words: impl Iterator<Item = &'a str>) -> Result<AovSet, String> {
+    let mut set = AovSet::default();
+    for word in words {
+        let aov = Aov::ALL.into_iter().find(|a| a.word() == word);
+        let all = || Aov::ALL.map(Aov::word).join(", ");
+        set.insert(
+            aov.ok_or_else(|| format!("there is no auxiliary picture `{word}`; there are {}", all()))?,
+        );
+    }
+    Ok(set)
+}
+
+/// Up as `y`, `z` or `x,y,z`.
+pub fn up(text: &str) -> Result<DVec3, String> {
+    match text {
+        "y" => Ok(DVec3::Y),
+        "z" => Ok(DVec3::Z),
+        _ => match vector(text)? {
+            DVec3::ZERO => Err("up has no direction".to_string()),
+            v => Ok(v),
+        },
+    }
+}
+
+/// Three numbers between commas.
+pub fn vector(text: &str) -> Result<DVec3, String> {
+    let numbers: Vec<f64> =
+        text.split(',').map(|s| s.trim().parse()).collect::<Result<_, _>>().unwrap_or_default();
+    match numbers.as_slice() {
+        &[x, y, z] if [x, y, z].iter().all(|x| limits::within(*x, &limits::NUMBER).is_ok()) => {
+            Ok(DVec3::new(x, y, z))
+        }
+        _ => Err(format!("`{text}` is not three numbers, as 0,1,5")),
+    }
+}
+
+/// A colour: three numbers, or one for all channels, not negative.
+pub fn color(text: &str) -> Result<Vec3, String> {
+    let v = if text.contains(',') {
+        vector(text)?
+    } else {
+        DVec3::splat(text.trim().parse().map_err(|_| format!("`{text}` is not a colour, as 0.1,0.2,0.3"))?)
+    };
+    for x in v.to_array() {
+        limits::within(x, &limits::COLOR)?;
+    }
+    Ok(v.as_vec3())
+}
+
+/// A light as typed: `point:x,y,z[,intensity]`.
+pub fn light(text: &str) -> Result<Light, String> {
+    let wrong =
+        || format!("`{text}` is not a light, as point:0,5,2 or point:0,5,2,0.8 (other lights: job file)");
+    let numbers = text.strip_prefix("point:").ok_or_else(wrong)?;
+    let (position, intensity) = match numbers.match_indices(',').nth(2) {
+        Some((i, _)) => (&numbers[..i], numbers[i + 1..].trim().parse::<f64>().map_err(|_| wrong())?),
+        None => (numbers, 1.0),
+    };
+    limits::within(intensity, &limits::COLOR)?;
+    Ok(Light::Point {
+        position: vector(position).map_err(|_| wrong())?.as_vec3(),
+        color: Vec3::ONE,
+        intensity: intensity as f32,
+        falloff: crate::scene::Falloff::None,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn defaults_are_those_of_the_contract() {
+        let s = Settings::new(&Options::default()).unwrap();
+        assert_eq!((s.size, s.samples, s.depth, s.fov_deg), ([1280, 720], 1, 10, 40.0));
+        assert_eq!((s.ambient, s.background), (Vec3::splat(0.1), Vec3::ZERO));
+        assert_eq!(
+            (s.prune, s.format.as_str(), s.camera, s.lights),
+            (1.0 / 4096.0, "png", CameraChoice::Auto, LightChoice::Auto)
+        );
+    }
+
+    #[test]
+    fn a_camera_from_the_command_line_is_laid_over_that_of_the_job() {
+        let pose = CameraPose { eye: DVec3::X, look_at: DVec3::ZERO, up: None, fov_deg: Some(30.0) };
+        let track =
+            CameraTrack { keys: vec![Key { frame: 0.0, value: pose }], interpolation: Interpolation::Linear };
+        let o =
+            Options { camera: Some(CameraChoice::Given(track)), eye: Some(DVec3::Y), ..Options::default() };
+        let camera = Settings::new(&o).unwrap().camera_at(Some(3)).unwrap();
+        assert_eq!((camera.eye, camera.look_at, camera.fov_deg), (DVec3::Y, DVec3::ZERO, 30.0));
+        let alone = Options { eye: Some(DVec3::Y), ..Options::default() };
+        assert!(Settings::new(&alone).unwrap_err().contains("--look-at"));
+    }
+
+    #[test]
+    fn words_and_numbers_as_typed() {
+        assert_eq!(vector("1,-2,3e1"), Ok(DVec3::new(1.0, -2.0, 30.0)));
+        assert!(vector("1,2").is_err() && vector("1,2,nan").is_err() && vector("a,b,c").is_err());
+        assert_eq!(color("0.5"), Ok(Vec3::splat(0.5)));
+        assert!(color("-1,0,0").is_err());
+        assert!(matches!(light("point:0,5,2,0.5"), Ok(Light::Point { intensity: 0.5, .. })));
+        assert!(light("spot:1,2,3").is_err() && light("point:1,2").is_err());
+        assert!(up("0,0,0").is_err() && up("z") == Ok(DVec3::Z));
+        assert!(format_word("PNG") == Ok("png".to_string()) && format_word("gif").is_err());
+    }
+}

@@ -1,0 +1,188 @@
+//! Where a pixel's samples lie: one Owen-scrambled Sobol sequence a pixel, warped by the filter. Seeded by pixel,
+//! seed and dimension, never by frame, so that what stands still does not flicker.
+//!
+//! Scrambling by hashes: Brent Burley, "Practical Hash-based Owen Scrambling", JCGT 9(4), 2020.
+
+use crate::scene::Filter;
+
+/// Half the gaussian filter's width in units of σ·√2: radius 1.5, σ 0.5.
+const GAUSSIAN_REACH: f32 = 3.0 * std::f32::consts::FRAC_1_SQRT_2;
+/// erf of [`GAUSSIAN_REACH`]: the part of the gaussian within three σ.
+const GAUSSIAN_WITHIN_REACH: f32 = 0.997_300_2;
+/// σ·√2 with σ = 0.5, in pixels.
+const GAUSSIAN_SCALE: f32 = std::f32::consts::FRAC_1_SQRT_2;
+
+/// Where sample `index` of `count` lies, from the pixel's upper left corner, in pixels. A single sample lies in the
+/// middle.
+pub fn place_in_pixel(filter: Filter, index: u32, count: u32, pixel: [u32; 2], seed: u32) -> [f32; 2] {
+    if count == 1 { [0.5; 2] } else { warp(filter, unit_square(index, pixel, seed)) }
+}
+
+/// Point `index` of a pixel's sequence in [0, 1)².
+pub fn unit_square(index: u32, pixel: [u32; 2], seed: u32) -> [f32; 2] {
+    let pixel_seed = hash(pixel[0] ^ hash(pixel[1] ^ hash(seed)));
+    let [x, y] = sobol(index);
+    [unit(owen_scramble(x, hash(pixel_seed))), unit(owen_scramble(y, hash(pixel_seed ^ 1)))]
+}
+
+/// Warps [0, 1)² by the filter's inverse cumulative distribution, separately in x and y.
+pub fn warp(filter: Filter, uv: [f32; 2]) -> [f32; 2] {
+    match filter {
+        Filter::Box => uv,
+        Filter::Triangle => uv.map(|u| 0.5 + triangle(u)),
+        Filter::Gaussian => uv.map(|u| 0.5 + gaussian(u)),
+    }
+}
+
+/// The tent of radius 1: its distribution is (1 + x)²/2 left of 0.
+fn triangle(u: f32) -> f32 {
+    if u < 0.5 { (2.0 * u).sqrt() - 1.0 } else { 1.0 - (2.0 - 2.0 * u).sqrt() }
+}
+
+/// The gaussian of σ 0.5, cut off at 1.5.
+fn gaussian(u: f32) -> f32 {
+    GAUSSIAN_SCALE
+        * inverse_erf((2.0 * u - 1.0) * GAUSSIAN_WITHIN_REACH).clamp(-GAUSSIAN_REACH, GAUSSIAN_REACH)
+}
+
+/// Mike Giles, "Approximating the erfinv function", GPU Computing Gems Jade Edition, 2011 (single precision).
+fn inverse_erf(x: f32) -> f32 {
+    const CENTRE: [f32; 9] = [
+        2.810_226_4e-8,
+        3.432_739_4e-7,
+        -3.523_387_7e-6,
+        -4.391_506_5e-6,
+        0.000_218_580_87,
+        -0.001_253_725,
+        -0.004_177_681_6,
+        0.246_640_73,
+        1.501_409_4,
+    ];
+    const TAIL: [f32; 9] = [
+        -0.000_200_214_26,
+        0.000_100_950_56,
+        0.001_349_343_2,
+        -0.003_673_428_4,
+        0.005_739_507_7,
+        -0.007_622_461,
+        0.009_438_870_5,
+        1.001_674,
+        2.832_976_8,
+    ];
+    let w = -libm::logf((1.0 - x) * (1.0 + x));
+    let (w, coefficients) = if w < 5.0 { (w - 2.5, CENTRE) } else { (w.sqrt() - 3.0, TAIL) };
+    x * coefficients.into_iter().fold(0.0, |sum, c| sum * w + c)
+}
+
+/// The first two dimensions of the Sobol sequence: van der Corput's, and the one of Pascal's triangle modulo 2.
+fn sobol(index: u32) -> [u32; 2] {
+    let mut second = 0;
+    let mut direction = 1 << 31;
+    let mut bits = index;
+    while bits != 0 {
+        if bits & 1 != 0 {
+            second ^= direction;
+        }
+        direction ^= direction >> 1;
+        bits >>= 1;
+    }
+    [index.reverse_bits(), second]
+}
+
+/// Flips each bit by a hash of the bits above it (Laine and Karras's permutation on reversed bits).
+fn owen_scramble(x: u32, seed: u32) -> u32 {
+    let mut x = x.reverse_bits().wrapping_add(seed);
+    for factor in [0x6c50_b47c, 0xb82f_1e52, 0xc7af_e638, 0x8d22_f6e6u32] {
+        x ^= x.wrapping_mul(factor);
+    }
+    x.reverse_bits()
+}
+
+/// The finaliser of `MurmurHash3`, moved off its fixed point 0.
+fn hash(x: u32) -> u32 {
+    let x = x.wrapping_add(0x9e37_79b9);
+    let x = (x ^ x >> 16).wrapping_mul(0x85eb_ca6b);
+    let x = (x ^ x >> 13).wrapping_mul(0xc2b2_ae35);
+    x ^ x >> 16
+}
+
+/// The upper 24 bits as a float in [0, 1).
+fn unit(x: u32) -> f32 {
+    (x >> 8) as f32 / 16_777_216.0
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_single_sample_lies_in_the_middle() {
+        for filter in [Filter::Box, Filter::Triangle, Filter::Gaussian] {
+            assert_eq!(place_in_pixel(filter, 0, 1, [3, 4], 5), [0.5, 0.5]);
+        }
+    }
+
+    /// A (0, k, 2)-net in base 2: each of the 2^k boxes of size 2^-a × 2^-(k−a) has one of the first 2^k points.
+    #[test]
+    fn the_first_points_are_stratified_in_every_elementary_interval() {
+        for pixel in [[0, 0], [17, 5], [1919, 1079]] {
+            for k in 0..=8 {
+                for a in 0..=k {
+                    let (columns, rows) = (1 << a, 1 << (k - a));
+                    let mut boxes = vec![0; columns * rows];
+                    for index in 0..1 << k {
+                        let [x, y] = unit_square(index, pixel, 9);
+                        boxes[(x * columns as f32) as usize * rows + (y * rows as f32) as usize] += 1;
+                    }
+                    assert!(boxes.iter().all(|&n| n == 1), "{pixel:?}, 2^{k} points, {columns} × {rows}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn pixels_and_seeds_differ_and_nothing_else_does() {
+        let at = |pixel, seed| unit_square(0, pixel, seed);
+        assert_eq!(at([3, 4], 0), at([3, 4], 0));
+        let all = [at([3, 4], 0), at([4, 3], 0), at([3, 4], 1), at([0, 0], 0), at([0, 0], 1)];
+        for (i, a) in all.iter().enumerate() {
+            assert!(all[..i].iter().all(|b| a != b));
+            assert!(a[0] != a[1], "the dimensions are scrambled alike");
+        }
+    }
+
+    /// Mean 0 from the pixel's centre; variances: box 1/12; triangle 1/6; gaussian cut off at 3σ:
+    /// σ²·(1 − 6·φ(3)/erf(3/√2)) = 0.25·(1 − 6·0.00443185/0.9973002) = 0.243334.
+    #[test]
+    fn samples_are_spread_as_the_filter_is() {
+        let count = 1 << 14;
+        for (filter, variance, reach) in [
+            (Filter::Box, 1.0 / 12.0, 0.5),
+            (Filter::Triangle, 1.0 / 6.0, 1.0),
+            (Filter::Gaussian, 0.243_334, 1.5),
+        ] {
+            for axis in 0..2 {
+                let offsets: Vec<f64> = (0..count)
+                    .map(|i| f64::from(place_in_pixel(filter, i, count, [2, 3], 0)[axis]) - 0.5)
+                    .collect();
+                let mean =
+                    |f: &dyn Fn(f64) -> f64| offsets.iter().map(|&x| f(x)).sum::<f64>() / f64::from(count);
+                assert!(mean(&|x| x).abs() < 1e-3, "{filter:?}: mean {}", mean(&|x| x));
+                assert!(
+                    (mean(&|x| x * x) - variance).abs() < 1e-3,
+                    "{filter:?}: variance {}",
+                    mean(&|x| x * x)
+                );
+                assert!(offsets.iter().all(|x| x.abs() <= reach), "{filter:?} reaches too far");
+            }
+        }
+    }
+
+    #[test]
+    fn the_inverse_of_erf_is_one() {
+        for i in -997..=997 {
+            let x = i as f32 / 1000.0;
+            assert!((libm::erf(f64::from(inverse_erf(x))) - f64::from(x)).abs() < 5e-7, "{x}");
+        }
+    }
+}

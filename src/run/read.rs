@@ -1,0 +1,257 @@
+//! The reader stage: files become a frame and a shot, and finished pictures are recognised before they are traced.
+
+use super::event::{ByteCounts, FrameReport, StageTimes, Status, UpdateReport};
+use super::prepare::Prepared;
+use super::slots::Slots;
+use super::source::Sources;
+use super::{Note, RunOptions, panic_text};
+use crate::device::Stop;
+use crate::diff::Change;
+use crate::format::{Loaded, ReadOptions};
+use crate::job::{Job, Picture, Settings};
+use crate::kernel;
+use crate::output::{Bits, Encoding, Format, Records};
+use crate::scene::{Frame, Object, PartHash, PartHasher, Shot};
+use crate::warning::Warnings;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::mpsc::Sender;
+
+/// Changes whenever the same inputs may give other pixels, so that pictures of other versions are made anew.
+const PICTURE_VERSION: u64 = 1;
+
+/// A frame that was read and must be traced.
+pub(super) struct ReadFrame {
+    pub(super) report: Box<FrameReport>,
+    pub(super) frame: Arc<Frame>,
+    pub(super) shot: Shot,
+    pub(super) encoding: Encoding,
+    pub(super) fingerprint: PartHash,
+    /// The picture, relative to the output folder.
+    pub(super) picture: PathBuf,
+}
+
+/// Reads the pictures of a job.
+pub(super) struct Reader<'a> {
+    job: &'a Job,
+    options: &'a RunOptions,
+    records: &'a Records,
+    prepared: Prepared,
+}
+
+/// Reads pictures in turn until there are no more, never more ahead of the device than there are slots.
+pub(super) fn read_stage(
+    reader: &Reader<'_>,
+    next: &AtomicUsize,
+    slots: &Slots,
+    stop: &Stop,
+    to_device: &Sender<Result<ReadFrame, Box<FrameReport>>>,
+    note: &Sender<Note>,
+) {
+    loop {
+        slots.take();
+        let index = next.fetch_add(1, Ordering::Relaxed);
+        if index >= reader.job.pictures.len() || stop.asked() {
+            // the other readers must come to this point too
+            slots.give();
+            return;
+        }
+        let mut warnings = Warnings::default();
+        let read = catch_unwind(AssertUnwindSafe(|| reader.read(index, &mut warnings)))
+            .unwrap_or_else(|panic| Err(reader.failed(index, &panic_text("reading", &*panic))));
+        if !warnings.is_empty() {
+            let _ = note.send(Note::Warnings(warnings));
+        }
+        if to_device.send(read).is_err() {
+            return;
+        }
+    }
+}
+
+impl<'a> Reader<'a> {
+    pub(super) fn new(
+        job: &'a Job,
+        options: &'a RunOptions,
+        records: &'a Records,
+        prepared: Prepared,
+    ) -> Self {
+        Self { job, options, records, prepared }
+    }
+
+    /// Reads one picture's frame; or its report, where it ends here: failed or finished already.
+    fn read(&self, index: usize, warnings: &mut Warnings) -> Result<ReadFrame, Box<FrameReport>> {
+        let picture = &self.job.pictures[index];
+        let mut report = self.blank(index);
+        let sources = &self.prepared.sources;
+        let loaded =
+            load_frame(self.job, picture, sources, self.options.lenient, self.options.strict, warnings);
+        let frame = match loaded {
+            Ok(loaded) => {
+                report.bytes.read = loaded.bytes_read;
+                report.ms.read = Some(loaded.read_ms);
+                report.ms.parse = Some(loaded.parse_ms);
+                loaded.frame
+            }
+            Err(error) => {
+                report.status = Status::Failed;
+                report.error = Some(error);
+                return Err(report);
+            }
+        };
+        report.triangles = frame.triangles();
+        let shot = self.prepared.shot(picture);
+        let encoding = encoding(&picture.settings);
+        let fingerprint = fingerprint(&frame, &shot, encoding);
+        if !self.options.overwrite && self.records.finished(&picture.picture, fingerprint) {
+            report.status = Status::Resumed;
+            report.change = Change::default();
+            return Err(report);
+        }
+        Ok(ReadFrame {
+            report,
+            frame: Arc::new(frame),
+            shot,
+            encoding,
+            fingerprint,
+            picture: picture.picture.clone(),
+        })
+    }
+
+    fn blank(&self, index: usize) -> Box<FrameReport> {
+        let picture = &self.job.pictures[index];
+        let sequence = &self.job.sequences[picture.sequence];
+        Box::new(FrameReport {
+            sequence: sequence.name.clone(),
+            frame: picture.frame,
+            source: picture.main_file(sequence).map(|f| file_name(&f.path)).unwrap_or_default(),
+            picture: picture.picture.to_string_lossy().into_owned(),
+            status: Status::Failed,
+            error: None,
+            device: None,
+            warm: false,
+            triangles: 0,
+            change: Change::default(),
+            update: UpdateReport::default(),
+            bytes: ByteCounts::default(),
+            rays: super::event::RayReport::default(),
+            ms: StageTimes::default(),
+            index,
+            device_failed: false,
+        })
+    }
+
+    fn failed(&self, index: usize, error: &str) -> Box<FrameReport> {
+        let mut report = self.blank(index);
+        report.error = Some(format!("{}: {error}", report.source));
+        report
+    }
+}
+
+/// A frame and what reading it cost; what was kept from an earlier frame costs nothing.
+struct LoadedFrame {
+    frame: Frame,
+    bytes_read: u64,
+    read_ms: f64,
+    parse_ms: f64,
+}
+
+fn load_frame(
+    job: &Job,
+    picture: &Picture,
+    sources: &Sources,
+    lenient: bool,
+    strict: bool,
+    warnings: &mut Warnings,
+) -> Result<LoadedFrame, String> {
+    let sequence = &job.sequences[picture.sequence];
+    let mut all = LoadedFrame { frame: Frame::default(), bytes_read: 0, read_ms: 0.0, parse_ms: 0.0 };
+    for source in &picture.sources {
+        let Some(file) = source.file else { continue };
+        let layer = &sequence.layers[source.layer];
+        let still = layer.files.len() == 1 && job.pictures.len() > 1;
+        let options = read_options(picture, layer.materials.as_deref(), lenient);
+        let path = &layer.files[file].path;
+        let (loaded, first) = sources.load(path, &options, still).map_err(|e| e.to_string())?;
+        if first {
+            all.bytes_read += loaded.bytes_read;
+            all.read_ms += loaded.read_ms;
+            all.parse_ms += loaded.parse_ms;
+            warnings.merge(&loaded.warnings);
+            warn_of_materials(path, &loaded, warnings);
+        }
+        if strict && let Some(missing) = loaded.missing.first() {
+            return Err(format!("{missing}; the frame is not rendered (--strict)"));
+        }
+        all.frame
+            .objects
+            .push(Object { geometry: Arc::clone(&loaded.geometry), transform: source.transform });
+    }
+    Ok(all)
+}
+
+/// Reads the frame of a picture, without the run around it.
+pub fn read_frame(
+    job: &Job,
+    picture: &Picture,
+    lenient: bool,
+    warnings: &mut Warnings,
+) -> Result<Frame, String> {
+    load_frame(job, picture, &Sources::default(), lenient, false, warnings).map(|l| l.frame)
+}
+
+/// Names what of the materials is not rendered as it says, and frames that nothing can be seen of.
+fn warn_of_materials(path: &Path, loaded: &Loaded, warnings: &mut Warnings) {
+    let g = &loaded.geometry;
+    for m in &g.materials {
+        if let Some(other) = kernel::fallback(m.illum) {
+            warnings.add(
+                None,
+                None,
+                format!("illum {} is rendered as illum {other} by this version", m.illum),
+            );
+        }
+        if !m.maps.is_empty() {
+            warnings.add(None, None, "textures are not rendered by this version; the constants are used");
+        }
+    }
+    let has_faces = !g.triangles.0.is_empty();
+    let is_seen = |run: &[u32; 2]| g.materials.get(run[1] as usize).is_none_or(|m| m.d > 0.0);
+    if has_faces && !g.material_runs.0.iter().any(is_seen) {
+        warnings.add(
+            Some(path),
+            None,
+            "every face is wholly transparent (d 0); some exporters write that by mistake",
+        );
+    }
+}
+
+/// How a layer of a picture is read.
+pub(super) fn read_options(picture: &Picture, materials: Option<&Path>, lenient: bool) -> ReadOptions {
+    ReadOptions { lenient, materials_file: materials.map(Path::to_path_buf), ..picture.settings.read.clone() }
+}
+
+fn file_name(path: &Path) -> String {
+    path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default()
+}
+
+/// How a picture is written.
+fn encoding(settings: &Settings) -> Encoding {
+    Encoding {
+        // the job room knows the same words, which a test holds together
+        format: Format::from_word(&settings.format).unwrap_or(Format::Png),
+        bits: Bits::from_number(settings.bits).unwrap_or_default(),
+        exposure_stops: settings.exposure_stops,
+    }
+}
+
+/// Names everything that bears on the picture file: parts, shot, encoding and the version of the pictures.
+fn fingerprint(frame: &Frame, shot: &Shot, encoding: Encoding) -> PartHash {
+    let mut h = PartHasher::new("picture");
+    h.u64(PICTURE_VERSION);
+    h.part(frame.hash());
+    shot.hash_into(&mut h);
+    encoding.hash_into(&mut h);
+    h.finish()
+}

@@ -1,0 +1,70 @@
+//! Loaded files of a run: what stands in more than one picture is parsed once.
+
+use crate::format::{self, FormatError, Loaded, ReadOptions};
+use std::collections::HashMap;
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::SystemTime;
+
+/// A file's state as the system tells it: size and time of change.
+type Stamp = (u64, Option<SystemTime>);
+
+struct Kept {
+    stamp: Stamp,
+    options: ReadOptions,
+    loaded: Arc<Loaded>,
+    /// Whether a picture has used it, so that its costs are told already.
+    used: bool,
+}
+
+/// Files that will be used again: still layers for the whole run, and first frames that were read for their lights
+/// until their turn comes.
+#[derive(Default)]
+pub(super) struct Sources {
+    kept: Mutex<HashMap<PathBuf, Kept>>,
+}
+
+impl Sources {
+    /// Loads an OBJ before its picture's turn and keeps it until then.
+    pub(super) fn ahead(&self, path: &Path, options: &ReadOptions) -> Result<Arc<Loaded>, FormatError> {
+        self.get(path, options, true, false).map(|(loaded, _)| loaded)
+    }
+
+    /// Loads an OBJ for a picture, or gives what is kept of it if the file's size and time are the same. `still`
+    /// keeps it for the other pictures. The flag tells whether this picture is the first to use it.
+    pub(super) fn load(
+        &self,
+        path: &Path,
+        options: &ReadOptions,
+        still: bool,
+    ) -> Result<(Arc<Loaded>, bool), FormatError> {
+        self.get(path, options, still, true)
+    }
+
+    fn get(
+        &self,
+        path: &Path,
+        options: &ReadOptions,
+        keep: bool,
+        uses: bool,
+    ) -> Result<(Arc<Loaded>, bool), FormatError> {
+        let stamp = std::fs::metadata(path).map(|m| (m.len(), m.modified().ok())).unwrap_or_default();
+        {
+            let mut kept = self.kept.lock().unwrap_or_else(PoisonError::into_inner);
+            if let Some(k) = kept.get_mut(path).filter(|k| k.stamp == stamp && k.options == *options) {
+                let found = (Arc::clone(&k.loaded), !k.used);
+                k.used |= uses;
+                if !keep {
+                    kept.remove(path);
+                }
+                return Ok(found);
+            }
+        }
+        let loaded = Arc::new(format::load_obj(path, options)?);
+        if keep {
+            let entry = Kept { stamp, options: options.clone(), loaded: Arc::clone(&loaded), used: uses };
+            self.kept.lock().unwrap_or_else(PoisonError::into_inner).insert(path.to_path_buf(), entry);
+        }
+        Ok((loaded, true))
+    }
+}

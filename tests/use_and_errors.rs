@@ -1,0 +1,70 @@
+//! Wrong use and bad input are named, with the exit status of CONTRACT 1; a bad frame fails alone.
+
+mod common;
+use common::{pictures, render, report, run, wave};
+
+#[test]
+fn wrong_use_ends_in_2_and_writes_nothing() {
+    let t = tempfile::tempdir().unwrap();
+    let t = t.path();
+    let input = wave(&t.join("w"), 2, 4, 6);
+    assert_eq!(run(t, ["--help"]).status, 0);
+    assert_eq!(run(t, ["--version"]).status, 0);
+    assert_eq!(run(t, ["render", "--no-such-option"]).status, 2);
+    for command in ["render", "inspect", "compare", "devices", "completions"] {
+        let help = run(t, [command, "--help"]);
+        assert!(help.status == 0 && help.stdout.contains(&format!("rentix {command}")), "{command}");
+    }
+    let refused = |input: &std::path::Path, more: &[&str], word: &str| {
+        let said = render(t, input, "out", more, 2).stderr;
+        assert!(said.contains(word), "{more:?}: {said}");
+        assert!(!t.join("out").exists(), "{more:?} made a folder");
+    };
+    refused(&t.join("absent"), &[], "absent");
+    refused(&input, &["--frames", "1-9"], "3");
+    refused(&input, &["--device", "gpu:99"], "gpu:99");
+    refused(&input, &["--size", "0x9"], "size");
+    refused(&input, &["--chunk", "3/2"], "chunk");
+    std::fs::write(t.join("file"), "kept").unwrap();
+    let said = render(t, &input, "file", &[], 2).stderr;
+    assert!(said.contains("file"), "{said}");
+    assert_eq!(std::fs::read(t.join("file")).unwrap(), b"kept");
+}
+
+#[test]
+fn a_bad_frame_is_named_and_fails_alone() {
+    let t = tempfile::tempdir().unwrap();
+    let t = t.path();
+    let input = wave(&t.join("w"), 3, 4, 6);
+    let obj = input.join("wave_0002.obj");
+    let text = std::fs::read_to_string(&obj).unwrap();
+    std::fs::write(&obj, format!("{text}f 1 2 999999\n")).unwrap();
+    let line = text.lines().count() + 1;
+    let r = t.join("r.json");
+    let args = ["--size", "32x18", "--report", r.to_str().unwrap()];
+    let said = render(t, &input, "out", &args, 1).stderr;
+    assert!(said.contains(&format!("wave_0002.obj:{line}: ")) && said.contains("999999"), "{said}");
+    assert!(said.contains("--frames 2"), "{said}");
+    assert_eq!(pictures(&t.join("out")).keys().collect::<Vec<_>>(), ["wave_0001.png", "wave_0003.png"]);
+    assert_eq!(report(&r)["totals"]["failed"], 1);
+    render(t, &input, "lenient", &["--size", "32x18", "--lenient"], 0);
+    std::fs::write(&obj, text).unwrap();
+    render(t, &input, "out", &["--size", "32x18", "--frames", "2"], 0);
+    assert_eq!(pictures(&t.join("out")).len(), 3);
+}
+
+#[test]
+fn events_are_one_json_object_a_line() {
+    let t = tempfile::tempdir().unwrap();
+    let t = t.path();
+    let input = wave(&t.join("w"), 2, 4, 6);
+    let said = render(t, &input, "out", &["--size", "32x18", "--json"], 0).stdout;
+    let events: Vec<serde_json::Value> = said.lines().map(|l| serde_json::from_str(l).unwrap()).collect();
+    let kinds: Vec<&str> = events.iter().map(|e| e["event"].as_str().unwrap()).collect();
+    assert_eq!(kinds, ["start", "frame", "frame", "end"]);
+    let frame = &events[1];
+    assert_eq!(frame["rays"]["camera"], 32 * 18);
+    assert_eq!(frame["triangles"], 2 * 4 * 6 + 2);
+    assert_eq!(frame["change"]["added"], 1);
+    assert_eq!(events[2]["change"]["deformed"], 1, "{}", events[2]);
+}
