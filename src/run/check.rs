@@ -2,11 +2,12 @@
 //! claimed for a picture that is not there.
 
 use super::event::{FrameReport, Status};
+use super::read::encoding;
 use super::report::Report;
 use super::{RunError, RunOptions};
 use crate::format;
-use crate::job::Job;
-use crate::output::Records;
+use crate::job::{Job, Picture};
+use crate::output::{Records, file_names};
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 
@@ -15,9 +16,8 @@ pub(super) fn nothing_is_lost(job: &Job, records: &Records, options: &RunOptions
     let there: Vec<PathBuf> = job
         .pictures
         .iter()
-        .map(|p| p.picture.as_path())
+        .flat_map(files_of)
         .filter(|p| job.folder.join(p).symlink_metadata().is_ok())
-        .map(Path::to_path_buf)
         .collect();
     if there.is_empty() {
         return Ok(());
@@ -50,6 +50,12 @@ fn input_files(job: &Job) -> HashSet<PathBuf> {
     files
 }
 
+/// The files of a picture, relative to the output folder.
+pub(super) fn files_of(picture: &Picture) -> Vec<PathBuf> {
+    let s = &picture.settings;
+    file_names(&picture.picture, encoding(s).format, s.aovs)
+}
+
 fn real(path: &Path) -> Option<PathBuf> {
     path.canonicalize().ok()
 }
@@ -58,8 +64,8 @@ fn real(path: &Path) -> Option<PathBuf> {
 pub(super) fn pictures_gone(job: &Job, report: &mut Report) -> Vec<FrameReport> {
     let mut gone = Vec::new();
     for frame in report.frames.iter_mut().filter(|f| f.status != Status::Failed) {
-        let path = job.folder.join(&job.pictures[frame.index].picture);
-        if !path.is_file() {
+        let files = files_of(&job.pictures[frame.index]);
+        if let Some(path) = files.iter().map(|f| job.folder.join(f)).find(|f| !f.is_file()) {
             frame.status = Status::Failed;
             frame.error =
                 Some(format!("{}: was written and is gone; render the frame again", path.display()));

@@ -190,7 +190,8 @@ fn panic_text(stage: &str, panic: &(dyn std::any::Any + Send)) -> String {
 
 /// Clears up after dead runs. What cannot be cleared up does no harm.
 fn clean_up(job: &Job) {
-    let _ = output::clean_up(&job.folder, job.pictures.iter().map(|p| p.picture.as_path()));
+    let files: Vec<PathBuf> = job.pictures.iter().flat_map(check::files_of).collect();
+    let _ = output::clean_up(&job.folder, files.iter().map(PathBuf::as_path));
 }
 
 /// Tells of those warnings that are new.

@@ -237,7 +237,7 @@ fn file_name(path: &Path) -> String {
 }
 
 /// How a picture is written.
-fn encoding(settings: &Settings) -> Encoding {
+pub(super) fn encoding(settings: &Settings) -> Encoding {
     Encoding {
         // the job room knows the same words, which a test holds together
         format: Format::from_word(&settings.format).unwrap_or(Format::Png),

@@ -1,6 +1,7 @@
 //! The rules, as functions of a house and a file's text.
 
 use std::fmt;
+use std::path::Path;
 
 use crate::source::{self, Kind, Name};
 
@@ -59,7 +60,7 @@ pub(crate) fn check(house: &House, files: &[File<'_>]) -> Vec<Breach> {
     let mut sources = Vec::new();
     for file in files {
         breaches.extend(length(house, file));
-        if file.path.ends_with(".rs") {
+        if Path::new(file.path).extension().is_some_and(|e| e == "rs") {
             match source::read(file.text, &module_path(file.path)) {
                 Ok(source) => sources.push((file, source)),
                 Err(why) => breaches.push(breach(file, 1, why)),
