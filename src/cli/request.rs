@@ -2,8 +2,8 @@
 
 use super::render_args::RenderArgs;
 use crate::job::options::limits::{self, within};
+use crate::job::words::one_of;
 use crate::job::{CameraChoice, LightChoice, Options, Request, settings};
-use crate::scene::Filter;
 use anyhow::{Result, anyhow};
 use std::ops::RangeInclusive;
 use std::str::FromStr;
@@ -47,13 +47,13 @@ fn options(args: &RenderArgs) -> Result<Options> {
         ambient: read("--ambient", args.ambient.as_deref(), settings::color)?,
         background: read("--background", args.background.as_deref(), settings::color)?,
         samples: ranged("--samples", args.samples, &limits::SAMPLES)?,
-        filter: read("--filter", args.filter.as_deref(), filter)?,
+        filter: read("--filter", args.filter.as_deref(), |w| one_of(&settings::FILTERS, w))?,
         depth: ranged("--depth", args.depth, &limits::DEPTH)?,
         seed: args.seed,
         exposure: ranged("--exposure", args.exposure, &limits::EXPOSURE)?,
         smooth_angle: ranged("--smooth-angle", args.smooth_angle, &limits::ANGLE)?,
         aov: aov.transpose().map_err(|e| anyhow!("--aov: {e}"))?,
-        mtl_srgb: read("--mtl-color", args.mtl_color.as_deref(), is_srgb)?,
+        mtl_srgb: read("--mtl-color", args.mtl_color.as_deref(), |w| one_of(&settings::MTL_COLORS, w))?,
         prune: ranged("--prune", args.prune, &limits::PRUNE)?,
         materials: Vec::new(),
     })
@@ -72,21 +72,4 @@ fn ranged<T: Copy + Into<f64>>(option: &str, x: Option<T>, range: &RangeInclusiv
         within(x.into(), range).map_err(|e| anyhow!("{option}: {e}"))?;
     }
     Ok(x)
-}
-
-fn filter(word: &str) -> Result<Filter, String> {
-    match word {
-        "box" => Ok(Filter::Box),
-        "triangle" => Ok(Filter::Triangle),
-        "gaussian" => Ok(Filter::Gaussian),
-        _ => Err(format!("`{word}` is none of box, triangle, gaussian")),
-    }
-}
-
-fn is_srgb(word: &str) -> Result<bool, String> {
-    match word {
-        "linear" => Ok(false),
-        "srgb" => Ok(true),
-        _ => Err(format!("`{word}` is neither linear nor srgb")),
-    }
 }

@@ -2,6 +2,7 @@
 
 use super::JobError;
 use super::names::{Name, group};
+use super::pattern::Pattern;
 use crate::warning::Warnings;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -20,7 +21,7 @@ pub struct FrameFile {
 /// Files that are frames of one sequence, ordered by number.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct Files {
-    /// What their names have in common, else the folder's name.
+    /// The folder's name, where they are all that is taken of it; else what their names have in common.
     pub(super) name: String,
     pub(super) files: Vec<FrameFile>,
 }
@@ -58,7 +59,7 @@ pub(super) fn discover(
             return Err(JobError::NotAnInput(input.to_path_buf()));
         }
         vec![input.to_path_buf()]
-    } else if let Some(pattern) = Pattern::of(input) {
+    } else if let Some(pattern) = pattern_of(input) {
         let folder = input.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
         let files =
             list(folder, &|name| is_obj(Path::new(name)) && pattern.matches(name.as_encoded_bytes()))?;
@@ -70,15 +71,20 @@ pub(super) fn discover(
         return Err(JobError::Absent(input.to_path_buf()));
     };
     let names: Vec<Name> = found.iter().map(|f| Name::of(stem_bytes(f))).collect();
-    let folder_name = folder_name(input);
     let sequences = if taking.one_sequence {
-        vec![in_natural_order(&found, &names, folder_name)]
+        vec![in_natural_order(&found, &names, input_name(input))]
     } else {
-        group(&names)
+        let groups = group(&names);
+        let is_whole_folder = groups.len() == 1 && input.is_dir();
+        let named = |text: String| {
+            let is_name = !is_whole_folder && text.chars().any(char::is_alphabetic);
+            if is_name { text } else { input_name(input) }
+        };
+        groups
             .into_iter()
             .map(|g| Files {
-                name: if g.text.chars().any(char::is_alphabetic) { g.text } else { folder_name.clone() },
                 files: g.members.iter().map(|&(number, i)| frame_file(number, &found[i])).collect(),
+                name: named(g.text),
             })
             .collect()
     };
@@ -107,8 +113,17 @@ fn stem_bytes(path: &Path) -> &[u8] {
     path.file_stem().unwrap_or_default().as_encoded_bytes()
 }
 
-/// The name of the folder that an INPUT is or lies in.
-pub(super) fn folder_name(input: &Path) -> String {
+/// The pattern in the last part of a path, if there is one.
+fn pattern_of(path: &Path) -> Option<Pattern> {
+    let pattern = Pattern::new(path.file_name()?.as_encoded_bytes());
+    pattern.has_signs().then_some(pattern)
+}
+
+/// The name of an INPUT: a file's stem, the name of the folder that it is or that a pattern stands in.
+pub(super) fn input_name(input: &Path) -> String {
+    if input.is_file() {
+        return String::from_utf8_lossy(stem_bytes(input)).into_owned();
+    }
     let folder = if input.is_dir() { Some(input) } else { input.parent() };
     let real = folder
         .map(|f| if f.as_os_str().is_empty() { Path::new(".") } else { f })
@@ -153,8 +168,9 @@ fn check_numbers(
         let name = |k: usize| sequence.files[k].path.clone();
         return Err(JobError::TwoOfANumber { number: numbers[i], first: name(i), second: name(i + 1) });
     }
-    // a simulation that writes every tenth step has no gaps
+    // a simulation that writes every tenth step has no gaps; two numbers are not enough to tell
     let step = numbers.windows(2).fold(0, |step, w| gcd(step, w[1] - w[0]));
+    let step = if numbers.len() > 2 { step } else { 1 };
     let gaps: Vec<String> = numbers
         .windows(2)
         .filter(|w| w[1] - w[0] > step)
@@ -178,77 +194,6 @@ fn check_numbers(
 
 fn gcd(a: i64, b: i64) -> i64 {
     if b == 0 { a } else { gcd(b, a % b) }
-}
-
-/// Whether a text matches a pattern of `*`, `?`, `#` and `%d`.
-pub(super) fn glob(pattern: &str, text: &str) -> bool {
-    match Pattern::of(Path::new(pattern)) {
-        Some(pattern) => pattern.matches(text.as_bytes()),
-        None => pattern == text,
-    }
-}
-
-/// A pattern for file names: `####` and `%04d` are numbers of at least that many digits, `%d` any number, `*` any
-/// text, `?` any byte.
-struct Pattern(Vec<Piece>);
-
-enum Piece {
-    Byte(u8),
-    Any,
-    AnyByte,
-    Number { digits: usize },
-}
-
-impl Pattern {
-    /// The pattern in the last part of a path, if there is one.
-    fn of(path: &Path) -> Option<Self> {
-        let name = path.file_name()?.as_encoded_bytes();
-        let mut pieces = Vec::new();
-        let mut i = 0;
-        while i < name.len() {
-            let rest = &name[i..];
-            let (piece, length) = match rest[0] {
-                b'*' => (Piece::Any, 1),
-                b'?' => (Piece::AnyByte, 1),
-                b'#' => {
-                    let digits = rest.iter().take_while(|b| **b == b'#').count();
-                    (Piece::Number { digits }, digits)
-                }
-                b'%' => {
-                    let width = rest[1..].iter().take_while(|b| b.is_ascii_digit()).count();
-                    if rest.get(1 + width) == Some(&b'd') {
-                        let digits =
-                            rest[1..=width].iter().fold(0, |n, b| (n * 10 + usize::from(b - b'0')).min(99));
-                        (Piece::Number { digits: digits.max(1) }, width + 2)
-                    } else {
-                        (Piece::Byte(b'%'), 1)
-                    }
-                }
-                byte => (Piece::Byte(byte), 1),
-            };
-            pieces.push(piece);
-            i += length;
-        }
-        let is_pattern = pieces.iter().any(|p| !matches!(p, Piece::Byte(_)));
-        is_pattern.then_some(Self(pieces))
-    }
-
-    fn matches(&self, name: &[u8]) -> bool {
-        matches(&self.0, name)
-    }
-}
-
-fn matches(pieces: &[Piece], name: &[u8]) -> bool {
-    let Some((piece, pieces)) = pieces.split_first() else { return name.is_empty() };
-    match piece {
-        Piece::Byte(b) => name.first() == Some(b) && matches(pieces, &name[1..]),
-        Piece::AnyByte => !name.is_empty() && matches(pieces, &name[1..]),
-        Piece::Any => (0..=name.len()).any(|i| matches(pieces, &name[i..])),
-        Piece::Number { digits } => {
-            let length = name.iter().take_while(|b| b.is_ascii_digit()).count();
-            length >= *digits && matches(pieces, &name[length..])
-        }
-    }
 }
 
 #[cfg(test)]
@@ -295,11 +240,39 @@ mod tests {
         assert!(warnings.list()[0].text.contains("frames 3, 5-8 "), "{:?}", warnings.list());
         let strict = Taking { strict: true, ..TAKING };
         assert!(matches!(discover(t.path(), strict, &mut warnings), Err(JobError::Gaps { .. })));
+        assert!(matches!(
+            discover(folder(&["w_1.obj", "w_3.obj"]).path(), strict, &mut warnings),
+            Err(JobError::Gaps { .. })
+        ));
         let every_tenth = folder(&["w_10.obj", "w_20.obj", "w_30.obj"]);
         assert!(discover(every_tenth.path(), strict, &mut warnings).is_ok());
         let t = folder(&["w_7.obj", "w_0007.obj", "w_8.obj"]);
         let error = discover(t.path(), TAKING, &mut warnings).unwrap_err().to_string();
         assert!(error.contains("w_7.obj") && error.contains("w_0007.obj"), "{error}");
+    }
+
+    #[test]
+    fn sequences_have_names() {
+        let names = |input: &Path| -> Vec<String> {
+            let found = discover(input, TAKING, &mut Warnings::default()).unwrap();
+            found.into_iter().map(|s| s.name).collect()
+        };
+        let t = folder(&[]);
+        let in_folder = |name: &str, files: &[&str]| {
+            let folder = t.path().join(name);
+            fs::create_dir(&folder).unwrap();
+            for file in files {
+                fs::write(folder.join(file), "").unwrap();
+            }
+            folder
+        };
+        assert_eq!(names(&in_folder("cloth", &["frame_1.obj", "frame_2.obj"])), ["cloth"]);
+        assert_eq!(names(&in_folder("sim", &["0000_00.obj", "0001_00.obj"])), ["sim"]);
+        let two = in_folder("two", &["a_01_1.obj", "a_01_2.obj", "a_02_1.obj", "b7.obj", "1.obj"]);
+        assert_eq!(names(&two), ["two", "a_01", "a_02", "b7"]);
+        assert_eq!(names(&two.join("a_02_#.obj")), ["a_02_1"]);
+        assert_eq!(names(&two.join("a_01_#.obj")), ["a_01"]);
+        assert_eq!(names(&two.join("1.obj")), ["1"]);
     }
 
     #[test]

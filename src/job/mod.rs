@@ -6,10 +6,12 @@ mod file;
 mod names;
 pub mod numbers;
 pub mod options;
+mod pattern;
 mod resolve;
 pub mod settings;
 mod template;
 pub mod track;
+pub mod words;
 
 pub use discover::FrameFile;
 pub use file::Outside;
@@ -118,10 +120,14 @@ pub struct Source {
 impl Picture {
     /// The file that names the picture: that of the first layer that moves, else of the first.
     pub fn main_file<'a>(&self, sequence: &'a Sequence) -> Option<&'a FrameFile> {
-        let moves = |s: &&Source| sequence.layers[s.layer].files.len() > 1;
-        let source = self.sources.iter().find(moves).or(self.sources.first())?;
-        source.file.map(|i| &sequence.layers[source.layer].files[i])
+        main_file(&sequence.layers, &self.sources)
     }
+}
+
+fn main_file<'a>(layers: &'a [Layer], sources: &[Source]) -> Option<&'a FrameFile> {
+    let moves = |s: &&Source| layers[s.layer].files.len() > 1;
+    let source = sources.iter().find(moves).or(sources.first())?;
+    source.file.map(|i| &layers[source.layer].files[i])
 }
 
 /// Why nothing can be tried (exit status 2).
@@ -191,3 +197,6 @@ pub enum JobError {
     #[error("{0}")]
     Options(String),
 }
+
+#[cfg(test)]
+mod tests;

@@ -12,13 +12,15 @@ pub(super) struct Name {
     /// One more than there are numbers.
     texts: Vec<Vec<u8>>,
     numbers: Vec<i64>,
+    /// The numbers as they are written.
+    written: Vec<Vec<u8>>,
 }
 
 impl Name {
     /// Cuts the bytes of a stem. A minus is a sign where a number and no letter or digit stands beside it: `walk_-5`
     /// has −5, `horse-01` has 1.
     pub(super) fn of(stem: &[u8]) -> Self {
-        let mut name = Self { texts: Vec::new(), numbers: Vec::new() };
+        let mut name = Self { texts: Vec::new(), numbers: Vec::new(), written: Vec::new() };
         let mut text_start = 0;
         let mut i = 0;
         while i < stem.len() {
@@ -31,7 +33,9 @@ impl Name {
                 let is_signed =
                     i > text_start && stem[i - 1] == b'-' && (i < 2 || !stem[i - 2].is_ascii_alphanumeric());
                 let magnitude = stem[i..digits_end].iter().fold(0, |n, b| n * 10 + i64::from(b - b'0'));
-                name.texts.push(stem[text_start..i - usize::from(is_signed)].to_vec());
+                let start = i - usize::from(is_signed);
+                name.texts.push(stem[text_start..start].to_vec());
+                name.written.push(stem[start..digits_end].to_vec());
                 name.numbers.push(if is_signed { -magnitude } else { magnitude });
                 text_start = digits_end;
             }
@@ -50,25 +54,32 @@ impl Name {
         pieces(self).cmp(&pieces(other)).then_with(|| self.texts.cmp(&other.texts))
     }
 
+    /// The whole name, for people.
+    fn whole(&self) -> String {
+        String::from_utf8_lossy(&self.bytes_without(None)).into_owned()
+    }
+
     /// What is left of the name without one of its numbers, for people.
     fn without(&self, run: usize) -> String {
+        String::from_utf8_lossy(&self.bytes_without(Some(run))).trim_matches(['_', '-', '.', ' ']).to_string()
+    }
+
+    fn bytes_without(&self, run: Option<usize>) -> Vec<u8> {
         let mut bytes = Vec::new();
         for (i, text) in self.texts.iter().enumerate() {
             bytes.extend_from_slice(text);
-            if i != run
-                && let Some(n) = self.numbers.get(i)
-            {
-                bytes.extend_from_slice(n.to_string().as_bytes());
+            if run != Some(i) {
+                bytes.extend_from_slice(self.written.get(i).map_or(&[], Vec::as_slice));
             }
         }
-        String::from_utf8_lossy(&bytes).trim_matches(['_', '-', '.', ' ']).to_string()
+        bytes
     }
 }
 
 /// Names that belong to one sequence: their places in the list that was grouped, with their frame numbers.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct Group {
-    /// What the names have in common; may be empty.
+    /// What the names have in common, which may be nothing; of a name alone with its text the whole.
     pub(super) text: String,
     /// Ordered by number.
     pub(super) members: Vec<(Option<i64>, usize)>,
@@ -87,9 +98,10 @@ pub(super) fn group(names: &[Name]) -> Vec<Group> {
         let first = members[0];
         let differs = |run: usize| members.iter().any(|&i| numbers(i)[run] != numbers(first)[run]);
         let runs = numbers(first).len();
+        let is_alone = members.len() == 1;
         let Some(frame_run) = (0..runs).rev().find(|&r| differs(r)).or(runs.checked_sub(1)) else {
             groups.push(Group {
-                text: names[first].without(usize::MAX),
+                text: names[first].whole(),
                 members: members.iter().map(|&i| (None, i)).collect(),
             });
             continue;
@@ -103,7 +115,9 @@ pub(super) fn group(names: &[Name]) -> Vec<Group> {
         for members in by_rest.into_values() {
             let mut members: Vec<_> = members.into_iter().map(|i| (Some(numbers(i)[frame_run]), i)).collect();
             members.sort_unstable();
-            groups.push(Group { text: names[members[0].1].without(frame_run), members });
+            let name = &names[members[0].1];
+            let text = if is_alone { name.whole() } else { name.without(frame_run) };
+            groups.push(Group { text, members });
         }
     }
     groups.sort_by(|a, b| names[a.members[0].1].natural_order(&names[b.members[0].1]));
@@ -126,9 +140,9 @@ mod tests {
     #[test]
     fn the_last_number_that_differs_is_the_frame() {
         assert_eq!(groups(&["walk_0010", "walk_0002"]), [one("walk", &[2, 10])]);
-        assert_eq!(groups(&["0000_00", "0001_00", "0010_00"]), [one("0", &[0, 1, 10])]);
+        assert_eq!(groups(&["0000_00", "0001_00", "0010_00"]), [one("00", &[0, 1, 10])]);
         assert_eq!(groups(&["10", "1", "2"]), [one("", &[1, 2, 10])]);
-        assert_eq!(groups(&["v2_a_7"]), [one("v2_a", &[7])]);
+        assert_eq!(groups(&["v2_a_7"]), [one("v2_a_7", &[7])]);
         assert_eq!(groups(&["house"]), [("house".to_string(), vec![None])]);
     }
 

@@ -57,7 +57,7 @@ impl FrameSet {
         let missing = |r: &Run| {
             let mut at = r.first;
             while at <= r.last && numbers.binary_search(&at).is_ok() {
-                at += r.step;
+                at = at.saturating_add(r.step);
             }
             (at <= r.last).then_some(at)
         };
@@ -220,6 +220,8 @@ mod tests {
         let set: FrameSet = "1-5x2,2".parse().unwrap();
         assert_eq!(set.first_not_in(&[1, 2, 3, 5]), None);
         assert_eq!(set.first_not_in(&[1, 3, 5]), Some(2));
+        let set: FrameSet = "1-5x9223372036854775807".parse().unwrap();
+        assert_eq!(set.first_not_in(&[1]), None);
     }
 
     #[test]

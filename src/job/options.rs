@@ -38,6 +38,15 @@ macro_rules! options {
             pub fn lay_over(&mut self, over: &Self) {
                 $(if over.$name.is_some() { self.$name.clone_from(&over.$name); })*
                 self.materials.extend_from_slice(&over.materials);
+                if over.camera.is_none()
+                    && let Some(CameraChoice::Given(track)) = &mut self.camera
+                {
+                    // what is given apart wins over what the camera had of its own
+                    for pose in track.keys.iter_mut().map(|k| &mut k.value) {
+                        pose.up = pose.up.filter(|_| over.up.is_none());
+                        pose.fov_deg = pose.fov_deg.filter(|_| over.fov.is_none());
+                    }
+                }
             }
         }
     };
@@ -110,7 +119,7 @@ pub mod limits {
     pub const EXPOSURE: RangeInclusive<f64> = -64.0..=64.0;
     /// Least weight of a ray.
     pub const PRUNE: RangeInclusive<f64> = 0.0..=1.0;
-    /// Angles of normals and half angles of cones, degrees.
+    /// Angles between normals, degrees.
     pub const ANGLE: RangeInclusive<f64> = 0.0..=180.0;
     /// Any number that f32 holds.
     pub const NUMBER: RangeInclusive<f64> = -3.4e38..=3.4e38;
@@ -118,13 +127,23 @@ pub mod limits {
     pub const COLOR: RangeInclusive<f64> = 0.0..=3.4e38;
     /// Whole numbers of 32 bits.
     pub const U32: RangeInclusive<f64> = 0.0..=4_294_967_295.0;
+    /// Half angles of a spot light's cone, degrees.
+    pub const HALF_ANGLE: RangeInclusive<f64> = 0.0..=90.0;
+    /// Frame numbers.
+    pub const FRAME: RangeInclusive<f64> = -9.0e15..=9.0e15;
+    /// Frames a second.
+    pub const FPS: RangeInclusive<f64> = 0.001..=1_000.0;
+    /// Bits a channel.
+    pub const BITS: RangeInclusive<f64> = 8.0..=16.0;
 
     /// Whether a number is within a range; else what to say.
     pub fn within(x: f64, range: &RangeInclusive<f64>) -> Result<f64, String> {
-        if range.contains(&x) {
-            Ok(x)
-        } else {
-            Err(format!("{x} is out of range: from {} to {}", range.start(), range.end()))
-        }
+        if range.contains(&x) { Ok(x) } else { Err(format!("{x} is out of range: allowed {}", told(range))) }
+    }
+
+    /// A range in words.
+    pub(in crate::job) fn told(range: &RangeInclusive<f64>) -> String {
+        let short = |x: f64| if x.abs() < 1e12 { x.to_string() } else { format!("{x:e}") };
+        format!("from {} to {}", short(*range.start()), short(*range.end()))
     }
 }

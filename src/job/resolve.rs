@@ -3,7 +3,9 @@
 use super::discover::{self, Files, Taking};
 use super::file::{self, JobFile, LayerFile, Outside, Override};
 use super::template::{Fill, fill};
-use super::{FrameFile, FrameSet, Job, JobError, Layer, Picture, Request, Sequence, Settings, Source};
+use super::{
+    FrameFile, FrameSet, Job, JobError, Layer, Picture, Request, Sequence, Settings, Source, main_file,
+};
 use crate::warning::Warnings;
 use std::collections::{HashMap, HashSet};
 use std::path::{Path, PathBuf};
@@ -17,10 +19,11 @@ pub fn resolve(request: &Request) -> Result<Job, JobError> {
         inputs: Vec::new(),
         sequences: Vec::new(),
         pictures: Vec::new(),
-        shared: None,
+        settings: HashMap::new(),
     };
-    let (files, inputs): (Vec<&PathBuf>, Vec<&PathBuf>) =
-        request.inputs.iter().chain(&request.job_file).partition(|i| is_job_file(i));
+    let (mut files, inputs): (Vec<&PathBuf>, Vec<&PathBuf>) =
+        request.inputs.iter().partition(|i| is_job_file(i));
+    files.extend(&request.job_file);
     let job_file = match files.as_slice() {
         [] => JobFile::default(),
         [path] => {
@@ -41,17 +44,15 @@ pub fn resolve(request: &Request) -> Result<Job, JobError> {
     }
 
     let stem = files.first().map(|p| p.file_stem().unwrap_or_default().to_string_lossy().into_owned());
-    let mut name = job_file.name.clone().or(stem);
+    let of_job = job_file.name.clone().or(stem);
+    let mut name = of_job.clone();
     if job_file.layers.is_empty() {
         let own: Vec<&PathBuf> = job_file.sequence.iter().collect();
         for input in if inputs.is_empty() { own } else { inputs } {
-            let sequences = discover::discover(input, job.taking(), &mut job.warnings)?;
-            let default =
-                if input.is_dir() { discover::folder_name(input) } else { sequences[0].name.clone() };
-            let name = name.get_or_insert(default);
-            for files in sequences {
-                job.add_sequence(name, files, &job_file)?;
+            for files in discover::discover(input, job.taking(), &mut job.warnings)? {
+                job.add_sequence(of_job.as_deref(), files, &job_file)?;
             }
+            name.get_or_insert_with(|| discover::input_name(input));
         }
     } else {
         job.add_layers(name.as_deref().unwrap_or("layers"), &job_file)?;
@@ -82,7 +83,8 @@ pub fn resolve(request: &Request) -> Result<Job, JobError> {
 const MAX_FRAMES: u64 = 1_000_000;
 
 fn is_job_file(path: &Path) -> bool {
-    path.extension().is_some_and(|e| e.eq_ignore_ascii_case("yaml") || e.eq_ignore_ascii_case("yml"))
+    let is_yaml = |e: &std::ffi::OsStr| e.eq_ignore_ascii_case("yaml") || e.eq_ignore_ascii_case("yml");
+    path.extension().is_some_and(is_yaml) && !path.is_dir()
 }
 
 struct Resolving<'a> {
@@ -91,8 +93,8 @@ struct Resolving<'a> {
     inputs: Vec<PathBuf>,
     sequences: Vec<Sequence>,
     pictures: Vec<Picture>,
-    /// The settings of all pictures where no override tells them apart.
-    shared: Option<Arc<Settings>>,
+    /// Settings by the places of the overrides that are laid over the job's.
+    settings: HashMap<Vec<usize>, Arc<Settings>>,
 }
 
 impl Resolving<'_> {
@@ -101,14 +103,14 @@ impl Resolving<'_> {
     }
 
     /// A sequence of one layer: a picture for each of its files.
-    fn add_sequence(&mut self, job_name: &str, files: Files, job: &JobFile) -> Result<(), JobError> {
+    fn add_sequence(&mut self, of_job: Option<&str>, files: Files, job: &JobFile) -> Result<(), JobError> {
         let sequence = self.sequences.len();
         let layer = Layer { name: files.name.clone(), files: files.files, materials: None, placed: None };
         let mut pictures = Vec::new();
         for (i, file) in layer.files.iter().enumerate() {
             let sources = vec![Source { layer: 0, file: Some(i), transform: None }];
-            let settings = self.settings(job, file.number, Some(&file.stem))?;
-            let with = Fill { stem: &file.stem, name: job_name, frame: file.number };
+            let settings = self.settings(job, file.number, &[&file.stem])?;
+            let with = Fill { stem: &file.stem, name: of_job.unwrap_or(&files.name), frame: file.number };
             let picture = picture_path(&settings, "{stem}", with)?;
             pictures.push(Picture { sequence, frame: file.number, sources, picture, settings });
         }
@@ -130,6 +132,9 @@ impl Resolving<'_> {
             }
             let files = found.remove(0);
             let name = given.name.clone().unwrap_or(files.name);
+            if let Some(absent) = given.materials.as_ref().filter(|m| !m.is_file()) {
+                return Err(JobError::Absent(absent.clone()));
+            }
             layers.push(Layer {
                 name,
                 files: files.files,
@@ -156,8 +161,10 @@ impl Resolving<'_> {
                     transform: l.placed.as_ref().map(|p| p.at(frame as f64)),
                 })
                 .collect();
-            let settings = self.settings(job, Some(frame), None)?;
-            let with = Fill { stem: job_name, name: job_name, frame: Some(frame) };
+            let shown = sources.iter().zip(&layers).filter_map(|(s, l)| Some(l.files[s.file?].stem.as_str()));
+            let settings = self.settings(job, Some(frame), &shown.collect::<Vec<_>>())?;
+            let stem = main_file(&layers, &sources).map_or(job_name, |f| &f.stem);
+            let with = Fill { stem, name: job_name, frame: Some(frame) };
             let picture = picture_path(&settings, "{name}_{frame:04}", with)?;
             pictures.push(Picture { sequence: 0, frame: Some(frame), sources, picture, settings });
         }
@@ -176,25 +183,26 @@ impl Resolving<'_> {
         Ok(())
     }
 
-    /// Defaults, then the job, then its overrides in turn, then the command line.
+    /// Defaults, then the job, then its overrides in turn, then the command line. An override of files is for
+    /// pictures that show one of them.
     fn settings(
         &mut self,
         job: &JobFile,
         frame: Option<i64>,
-        stem: Option<&str>,
+        stems: &[&str],
     ) -> Result<Arc<Settings>, JobError> {
-        if let Some(shared) = &self.shared {
-            return Ok(Arc::clone(shared));
+        let applying: Vec<usize> =
+            (0..job.overrides.len()).filter(|&i| applies(&job.overrides[i], frame, stems)).collect();
+        if let Some(settings) = self.settings.get(&applying) {
+            return Ok(Arc::clone(settings));
         }
         let mut options = job.options.clone();
-        for o in job.overrides.iter().filter(|o| applies(o, frame, stem)) {
-            options.lay_over(&o.options);
+        for &i in &applying {
+            options.lay_over(&job.overrides[i].options);
         }
         options.lay_over(&self.request.options);
-        let settings = Settings::new(&options).map(Arc::new).map_err(JobError::Options)?;
-        if job.overrides.is_empty() {
-            self.shared = Some(Arc::clone(&settings));
-        }
+        let settings = Arc::new(Settings::new(&options).map_err(JobError::Options)?);
+        self.settings.insert(applying, Arc::clone(&settings));
         Ok(settings)
     }
 
@@ -226,9 +234,9 @@ impl Resolving<'_> {
         }
     }
 
-    /// `--frames`, then `--chunk`, then `--order`.
+    /// `--frames`, else the job's, then `--chunk`, then `--order`.
     fn choose(&mut self, of_job: Option<&FrameSet>) -> Result<(), JobError> {
-        for set in [of_job, self.request.frames.as_ref()].into_iter().flatten() {
+        if let Some(set) = self.request.frames.as_ref().or(of_job) {
             let mut numbers: Vec<i64> = self.pictures.iter().filter_map(|p| p.frame).collect();
             numbers.sort_unstable();
             if let Some(missing) = set.first_not_in(&numbers) {
@@ -244,9 +252,9 @@ impl Resolving<'_> {
     }
 }
 
-fn applies(o: &Override, frame: Option<i64>, stem: Option<&str>) -> bool {
+fn applies(o: &Override, frame: Option<i64>, stems: &[&str]) -> bool {
     o.frames.as_ref().is_none_or(|set| frame.is_some_and(|f| set.contains(f)))
-        && o.files.as_ref().is_none_or(|pattern| stem.is_some_and(|s| discover::glob(pattern, s)))
+        && o.files.as_ref().is_none_or(|pattern| stems.iter().any(|s| pattern.matches(s.as_bytes())))
 }
 
 fn picture_path(settings: &Settings, default: &str, with: Fill<'_>) -> Result<PathBuf, JobError> {
@@ -255,33 +263,30 @@ fn picture_path(settings: &Settings, default: &str, with: Fill<'_>) -> Result<Pa
     Ok(PathBuf::from(format!("{name}.{}", settings.format)))
 }
 
-/// The frames of a job with layers: those it names, else those of the longest layer (or 1 where it has no number).
+/// The frames of a job with layers: those it names, else those of the longest layer (1 where it has no number).
 fn layer_frames(layers: &[Layer], job: &JobFile) -> Vec<i64> {
-    let longest = layers.iter().max_by_key(|l| l.files.len());
-    let (first, last) = longest.map_or((1, 1), |l| {
-        let first = l.files.first().and_then(|f| f.number).unwrap_or(1);
-        (first, l.files.last().and_then(|f| f.number).unwrap_or(first))
-    });
-    match &job.frames {
-        Some(set) => set.iter().collect(),
-        None => (first..=last).collect(),
+    if let Some(set) = &job.frames {
+        return set.iter().collect();
     }
+    // of several the first
+    let longest = layers.iter().rev().max_by_key(|l| l.files.len());
+    longest.into_iter().flat_map(|l| &l.files).map(|f| f.number.unwrap_or(1)).collect()
 }
 
 /// The file that a layer shows so many frames after the job's first one (CONTRACT 3: start + step · offset, in a gap
 /// the last one before).
 fn layer_file(files: &[FrameFile], given: &LayerFile, offset: i64) -> Option<usize> {
-    let first = files.first()?.number.unwrap_or(0);
-    let last = files.last()?.number.unwrap_or(0);
-    let mut number = given.start.unwrap_or(first).saturating_add(given.step.saturating_mul(offset));
-    if !(first..=last).contains(&number) {
-        number = match given.outside {
-            Outside::Hold => number.clamp(first, last),
-            Outside::Loop => first + (number - first).rem_euclid(last - first + 1),
+    let number = |f: &FrameFile| f.number.unwrap_or(0);
+    let (first, last) = (number(files.first()?), number(files.last()?));
+    let mut wanted = given.start.unwrap_or(first).saturating_add(given.step.saturating_mul(offset));
+    if !(first..=last).contains(&wanted) {
+        wanted = match given.outside {
+            Outside::Hold => wanted.clamp(first, last),
+            Outside::Loop => first + wanted.saturating_sub(first).rem_euclid(last - first + 1),
             Outside::Hide => return None,
         };
     }
-    files.iter().rposition(|f| f.number.unwrap_or(0) <= number)
+    files.partition_point(|f| number(f) <= wanted).checked_sub(1)
 }
 
 #[cfg(test)]

@@ -2,12 +2,28 @@
 
 use super::options::{CameraChoice, LightChoice, Options, limits};
 use super::track::{CameraPose, CameraTrack, Interpolation, Key};
+use super::words::{listed, nearest, one_of};
 use crate::format::ReadOptions;
 use crate::math::{DVec3, Vec3};
-use crate::scene::{Aov, AovSet, Camera, Filter, Light, Shot};
+use crate::scene::{Aov, AovSet, Camera, Falloff, Filter, Light, Shot};
 
 /// Picture formats of this version, by their words.
 pub const FORMATS: [&str; 3] = ["png", "exr", "ppm"];
+
+/// Pixel filters by their words.
+pub const FILTERS: [(&str, Filter); 3] =
+    [("box", Filter::Box), ("triangle", Filter::Triangle), ("gaussian", Filter::Gaussian)];
+
+/// Whether colours in an MTL are sRGB, by the words.
+pub const MTL_COLORS: [(&str, bool); 2] = [("linear", false), ("srgb", true)];
+
+/// How a light weakens, by the words.
+pub(super) const FALLOFFS: [(&str, Falloff); 2] =
+    [("none", Falloff::None), ("inverse-square", Falloff::InverseSquare)];
+
+/// How keys are joined, by the words.
+pub(super) const INTERPOLATIONS: [(&str, Interpolation); 2] =
+    [("linear", Interpolation::Linear), ("smooth", Interpolation::Smooth)];
 
 /// Everything that bears on one picture but its geometry.
 #[derive(Clone, Debug, PartialEq)]
@@ -155,7 +171,8 @@ pub fn format_word(word: &str) -> Result<String, String> {
     if FORMATS.contains(&lower.as_str()) {
         Ok(lower)
     } else {
-        Err(format!("there is no picture format `{word}`; there are {}", FORMATS.join(", ")))
+        let hint = nearest(&lower, FORMATS.into_iter());
+        Err(format!("there is no picture format `{word}`{hint}; allowed: {}", FORMATS.join(", ")))
     }
 }
 
@@ -168,24 +185,27 @@ pub fn bits(x: f64) -> Result<u8, String> {
 pub fn aovs<'a>(words: impl Iterator<Item = &'a str>) -> Result<AovSet, String> {
     let mut set = AovSet::default();
     for word in words {
+        let all = || Aov::ALL.into_iter().map(Aov::word);
         let aov = Aov::ALL.into_iter().find(|a| a.word() == word);
-        let all = || Aov::ALL.map(Aov::word).join(", ");
-        set.insert(
-            aov.ok_or_else(|| format!("there is no auxiliary picture `{word}`; there are {}", all()))?,
-        );
+        set.insert(aov.ok_or_else(|| {
+            let hint = nearest(word, all());
+            format!("there is no auxiliary picture `{word}`{hint}; allowed: {}", listed(all()))
+        })?);
     }
     Ok(set)
 }
 
+/// Up as `y` or `z`.
+pub(super) fn up_word(word: &str) -> Result<DVec3, String> {
+    one_of(&[("y", DVec3::Y), ("z", DVec3::Z)], word)
+}
+
 /// Up as `y`, `z` or `x,y,z`.
 pub fn up(text: &str) -> Result<DVec3, String> {
-    match text {
-        "y" => Ok(DVec3::Y),
-        "z" => Ok(DVec3::Z),
-        _ => match vector(text)? {
-            DVec3::ZERO => Err("up has no direction".to_string()),
-            v => Ok(v),
-        },
+    match text.contains(',').then(|| vector(text)).transpose()? {
+        None => up_word(text).map_err(|e| format!("{e}, or three numbers, as 0,0,1")),
+        Some(DVec3::ZERO) => Err("up has no direction".to_string()),
+        Some(v) => Ok(v),
     }
 }
 

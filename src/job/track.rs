@@ -5,8 +5,7 @@ use crate::scene::Camera;
 use glam::DQuat;
 
 /// How values between keys are made.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Default, serde::Deserialize)]
-#[serde(rename_all = "lowercase")]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub enum Interpolation {
     /// Straight.
     #[default]

@@ -6,8 +6,7 @@ use super::part::PartHasher;
 use crate::math::Vec3;
 
 /// The pixel filter, sampled, not splatted.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Default, serde::Deserialize)]
-#[serde(rename_all = "lowercase")]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub enum Filter {
     /// Width 1.
     #[default]

@@ -1,17 +1,21 @@
 //! The job file: YAML, strict. Each error has line, column, what is allowed, and the nearest known name.
 
-mod schema;
-mod value;
+mod fields;
+mod node;
+mod scene;
 
 use super::JobError;
 use super::numbers::FrameSet;
-use super::options::{CameraChoice, LightChoice, Options};
-use super::settings;
-use super::track::{CameraPose, CameraTrack, Key, Placed, Transform};
-use crate::format::{MaterialOverride, is_mtl_word};
-use crate::math::{DVec3, Vec3};
-use crate::scene::{Falloff, Light};
-use schema::Choice;
+use super::options::{Options, limits};
+use super::pattern::Pattern;
+use super::settings::{self, FILTERS, MTL_COLORS};
+use super::track::Placed;
+use super::words::one_of;
+use crate::math::Vec3;
+use crate::scene::AovSet;
+use fields::{Fields, Read, color, frames, list, number, parsed, text, truth, whole};
+use node::{Node, Value, Wrong};
+use std::io::Read as _;
 use std::path::{Path, PathBuf};
 
 /// What a job file says.
@@ -50,328 +54,214 @@ pub enum Outside {
     Hide,
 }
 
+const OUTSIDES: [(&str, Outside); 3] =
+    [("hold", Outside::Hold), ("loop", Outside::Loop), ("hide", Outside::Hide)];
+
 /// Settings for some of the frames.
 #[derive(Debug)]
 pub(super) struct Override {
     pub(super) frames: Option<FrameSet>,
-    /// Pattern on the stem.
-    pub(super) files: Option<String>,
+    /// On the stem.
+    pub(super) files: Option<Pattern>,
     pub(super) options: Options,
-}
-
-/// Reads a job file.
-pub(super) fn read(path: &Path) -> Result<JobFile, JobError> {
-    let unreadable = |source| JobError::Unreadable { path: path.to_path_buf(), source };
-    let length = std::fs::metadata(path).map_err(unreadable)?.len();
-    if length > MAX_BYTES {
-        return Err(JobError::File {
-            path: path.to_path_buf(),
-            place: String::new(),
-            text: format!("has {length} bytes, more than the {MAX_BYTES} of any job file"),
-        });
-    }
-    let text = std::fs::read_to_string(path).map_err(unreadable)?;
-    let folder = path.parent().unwrap_or(Path::new(""));
-    parse(&text, folder).map_err(|(place, text)| JobError::File { path: path.to_path_buf(), place, text })
 }
 
 /// No job file is larger.
 const MAX_BYTES: u64 = 1 << 20;
 
-/// Paths are relative to the folder. An error is its place, as `:3:12`, and its text.
-fn parse(text: &str, folder: &Path) -> Result<JobFile, (String, String)> {
-    let job: schema::Job = serde_yaml::from_str(text).map_err(|e| {
-        let told = e.to_string();
-        // of a key that stands twice serde tells only where its map begins
-        let twice = told.split("duplicate field `").nth(1).and_then(|t| t.split('`').next());
-        let place = twice.map(|key| line_of(text, key, true));
-        let place = place.or_else(|| e.location().map(|l| format!(":{}:{}", l.line(), l.column())));
-        (place.unwrap_or_default(), plainly(&told))
+/// Reads a job file; paths in it are relative to its folder.
+pub(super) fn read(path: &Path) -> Result<JobFile, JobError> {
+    let unreadable = |source| JobError::Unreadable { path: path.to_path_buf(), source };
+    let wrong = |place: String, text: String| JobError::File { path: path.to_path_buf(), place, text };
+    let mut yaml = String::new();
+    let file = std::fs::File::open(path).map_err(unreadable)?;
+    file.take(MAX_BYTES + 1).read_to_string(&mut yaml).map_err(unreadable)?;
+    if yaml.len() as u64 > MAX_BYTES {
+        return Err(wrong(String::new(), format!("is longer than the {MAX_BYTES} bytes of any job file")));
+    }
+    let folder = path.parent().unwrap_or(Path::new(""));
+    parse(&yaml, folder).map_err(|e| wrong(format!(":{}:{}", e.line, e.column), e.to_string()))
+}
+
+/// Keys that the job and its overrides share.
+const SCENE_KEYS: [&str; 15] = [
+    "camera",
+    "lights",
+    "ambient",
+    "background",
+    "samples",
+    "filter",
+    "depth",
+    "seed",
+    "up",
+    "exposure",
+    "smooth_angle",
+    "aov",
+    "mtl_color",
+    "prune",
+    "materials",
+];
+
+/// Keys that the job has in `output` and an override beside the others.
+const PICTURE_KEYS: [&str; 6] = ["name", "format", "size", "alpha", "bits", "quality"];
+
+const JOB_KEYS: [&str; 10] =
+    ["version", "name", "sequence", "layers", "frames", "output", "priority", "fps", "clip", "overrides"];
+
+fn parse(yaml: &str, folder: &Path) -> Read<JobFile> {
+    let root = node::parse(yaml)?;
+    let job = Fields::of(&root, &[&JOB_KEYS, &SCENE_KEYS])?;
+    job.get("version", |node| match node.value {
+        Value::Number(1.0) => Ok(()),
+        _ => Err(Wrong::at(node, "this version of rentix reads job files of version 1")),
     })?;
-    // these are checks between values; the line is that of the key they are about
-    convert(job, folder).map_err(|(key, wrong)| (line_of(text, key, false), wrong))
-}
+    // those two are for the daemon and for glTF; here they are only checked
+    job.get("priority", whole(limits::FRAME))?;
+    job.get("fps", number(limits::FPS))?;
+    job.get("clip", text)?;
 
-/// The first or last line that begins with a key, as `:3:1`.
-fn line_of(text: &str, key: &str, last: bool) -> String {
-    let begins = |l: &&str| {
-        l.trim_start_matches([' ', '-', '{'])
-            .strip_prefix(key)
-            .is_some_and(|r| r.trim_start().starts_with(':'))
-    };
-    let mut lines = text.lines().zip(1..).filter(|(l, _)| begins(l)).map(|(_, n)| n);
-    let line: Option<u32> = if last { lines.last() } else { lines.next() };
-    line.map(|l| format!(":{l}:1")).unwrap_or_default()
-}
-
-/// serde's text without the place, which stands in front, and with the nearest known name.
-fn plainly(text: &str) -> String {
-    let text = text.split(" at line ").next().unwrap_or(text);
-    let Some(rest) = text.split("unknown field `").nth(1).or_else(|| text.split("unknown variant `").nth(1))
-    else {
-        return text.to_string();
-    };
-    let mut words = rest.split('`');
-    let unknown = words.next().unwrap_or_default();
-    let known = words.skip(1).step_by(2);
-    match known.map(|w| (distance(unknown, w), w)).min() {
-        Some((d, nearest)) if d <= 1 + unknown.len() / 3 => format!("{text} (did you mean `{nearest}`?)"),
-        _ => text.to_string(),
-    }
-}
-
-/// Levenshtein's distance.
-fn distance(a: &str, b: &str) -> usize {
-    let b: Vec<char> = b.chars().collect();
-    let mut row: Vec<usize> = (0..=b.len()).collect();
-    for (i, ca) in a.chars().enumerate() {
-        let mut diagonal = row[0];
-        row[0] = i + 1;
-        for (j, cb) in b.iter().enumerate() {
-            let change = diagonal + usize::from(ca != *cb);
-            diagonal = row[j + 1];
-            row[j + 1] = change.min(diagonal + 1).min(row[j] + 1);
+    match (job.node("sequence"), job.node("layers")) {
+        (None, None) => return Err(Wrong::at(&root, "a job needs `sequence` or `layers`")),
+        (Some(_), Some(layers)) => {
+            return Err(Wrong::at(layers, "a job has either `sequence` or `layers`; remove one"));
         }
+        _ => {}
     }
-    row[b.len()]
-}
-
-/// An error between values: the key that it is about, and what is wrong.
-type Wrong = (&'static str, String);
-
-macro_rules! scene_options {
-    ($options:ident, $from:ident) => {
-        $options.camera = $from.camera.map(camera).transpose()?;
-        $options.lights = $from.lights.map(lights).transpose()?;
-        $options.ambient = $from.ambient.map(|t| t.f32());
-        $options.background = $from.background.map(|t| t.f32());
-        $options.samples = $from.samples.map(|n| n.0 as u32);
-        $options.filter = $from.filter;
-        $options.depth = $from.depth.map(|n| n.0 as u32);
-        $options.seed = $from.seed.map(|n| n.0 as u32);
-        $options.up = $from.up.map(|u| u.0);
-        $options.exposure = $from.exposure.map(|n| n.0 as f32);
-        $options.smooth_angle = $from.smooth_angle.map(|n| n.0 as f32);
-        $options.mtl_srgb = $from.mtl_color.map(|c| matches!(c, schema::MtlColor::Srgb));
-        $options.prune = $from.prune.map(|n| n.0 as f32);
-        if let Some(words) = &$from.aov {
-            $options.aov = Some(settings::aovs(words.iter().map(|w| w.0.as_str())).map_err(|e| ("aov", e))?);
-        }
-        $options.materials = materials($from.materials)?;
-    };
-}
-
-macro_rules! output_options {
-    ($options:ident, $from:ident) => {
-        $options.name = $from.name.map(|n| n.0);
-        $options.format = $from.format.map(|f| f.0);
-        $options.size = $from.size.map(|[w, h]| [w.0 as u32, h.0 as u32]);
-        $options.alpha = $from.alpha;
-        $options.bits = $from.bits.map(|b| settings::bits(b.0)).transpose().map_err(|e| ("bits", e))?;
-        $options.quality = $from.quality.map(|q| q.0 as u8);
-    };
-}
-
-fn convert(job: schema::Job, folder: &Path) -> Result<JobFile, Wrong> {
-    if job.version.as_ref().is_some_and(|v| v.0 != 1.0) {
-        return Err(("version", "this version of rentix reads job files of version 1".to_string()));
-    }
-    if job.sequence.is_some() == job.layers.as_ref().is_some_and(|l| !l.is_empty()) {
-        return Err(("sequence", "a job has either `sequence` or `layers`".to_string()));
-    }
-    let mut options = Options::default();
-    scene_options!(options, job);
+    let path = |node: &Node| text(node).map(|p| folder.join(p));
     let mut file = JobFile {
-        name: job.name.map(|n| n.0),
-        sequence: job.sequence.map(|s| folder.join(s.0)),
-        frames: job.frames.map(|f| f.0),
-        ..JobFile::default()
+        name: job.get("name", plain_name)?,
+        sequence: job.get("sequence", path)?,
+        layers: job.get("layers", |node| layers(node, folder))?.unwrap_or_default(),
+        frames: job.get("frames", frames)?,
+        options: scene_options(&job)?,
+        overrides: job.get("overrides", list(override_of))?.unwrap_or_default(),
+        folder: None,
     };
-    if let Some(output) = job.output {
-        output_options!(options, output);
-        file.folder = output.folder.map(|f| folder.join(f.0));
-    }
-    file.options = options;
-    for layer in job.layers.unwrap_or_default() {
-        file.layers.push(convert_layer(layer, folder)?);
-    }
-    for o in job.overrides.unwrap_or_default() {
-        let mut options = Options::default();
-        scene_options!(options, o);
-        output_options!(options, o);
-        file.overrides.push(Override { frames: o.frames.map(|f| f.0), files: o.files.map(|f| f.0), options });
-    }
+    job.get("output", |node| {
+        let output = Fields::of(node, &[&["folder"], &PICTURE_KEYS])?;
+        file.folder = output.get("folder", path)?;
+        picture_options(&output, &mut file.options)
+    })?;
     Ok(file)
 }
 
-fn camera(choice: Choice<schema::Camera>) -> Result<CameraChoice, Wrong> {
-    let Choice::Given(c) = choice else { return Ok(CameraChoice::Auto) };
-    let wrong = |text: &str| Err(("camera", text.to_string()));
-    if c.gltf.is_some() {
-        return wrong("glTF cameras are not supported by this version");
-    }
-    let keys: Vec<Key<CameraPose>> = match (c.keys, c.eye, c.look_at) {
-        (Some(keys), None, None) => keys
-            .into_iter()
-            .map(|k| Key {
-                frame: k.frame.0,
-                value: CameraPose {
-                    eye: k.eye.0,
-                    look_at: k.look_at.0,
-                    up: k.up.or(None).map(|u| u.0).or(c.up.as_ref().map(|u| u.0)),
-                    fov_deg: k.fov.map(|f| f.0).or(c.fov.as_ref().map(|f| f.0)),
-                },
-            })
-            .collect(),
-        (None, Some(eye), Some(look_at)) => {
-            let value = CameraPose {
-                eye: eye.0,
-                look_at: look_at.0,
-                up: c.up.map(|u| u.0),
-                fov_deg: c.fov.map(|f| f.0),
-            };
-            vec![Key { frame: 0.0, value }]
-        }
-        (Some(_), ..) => return wrong("a camera with keys has eye and look_at in the keys"),
-        (None, ..) => return wrong("a camera needs both eye and look_at (or keys)"),
-    };
-    if let Some(k) = keys.iter().find(|k| k.value.eye == k.value.look_at) {
-        return Err(("camera", format!("eye and look_at are both {}", k.value.eye)));
-    }
-    Ok(CameraChoice::Given(CameraTrack { keys: ordered(keys, "camera")?, interpolation: c.interpolate }))
-}
-
-/// Keys in the order of their frames; there must be one, and no two at a frame.
-fn ordered<T>(mut keys: Vec<Key<T>>, what: &'static str) -> Result<Vec<Key<T>>, Wrong> {
-    keys.sort_by(|a, b| a.frame.total_cmp(&b.frame));
-    if keys.is_empty() {
-        return Err((what, "the list of keys is empty".to_string()));
-    }
-    match keys.windows(2).find(|w| w[0].frame == w[1].frame) {
-        Some(w) => Err((what, format!("two keys are at frame {}", w[0].frame))),
-        None => Ok(keys),
-    }
-}
-
-fn lights(choice: Choice<Vec<schema::Light>>) -> Result<LightChoice, Wrong> {
-    let Choice::Given(list) = choice else { return Ok(LightChoice::Auto) };
-    list.into_iter().map(light).collect::<Result<_, _>>().map(LightChoice::Given)
-}
-
-fn light(l: schema::Light) -> Result<Light, Wrong> {
-    let color = |c: Option<value::Triple<value::Color>>| c.map_or(Vec3::ONE, |c| c.f32());
-    let intensity = |i: Option<value::Number<value::Color>>| i.map_or(1.0, |i| i.0 as f32);
-    let falloff = |f: schema::Falloff| match f {
-        schema::Falloff::None => Falloff::None,
-        schema::Falloff::InverseSquare => Falloff::InverseSquare,
-    };
-    let direction = |d: value::Triple<value::Any>| match d.f32() {
-        Vec3::ZERO => Err(("lights", "a direction has no length".to_string())),
-        d => Ok(d),
-    };
-    match (l.point, l.directional, l.spot, l.area) {
-        (Some(p), None, None, None) => Ok(Light::Point {
-            position: p.position.f32(),
-            color: color(p.color),
-            intensity: intensity(p.intensity),
-            falloff: falloff(p.falloff),
-        }),
-        (None, Some(d), None, None) => Ok(Light::Directional {
-            direction: direction(d.direction)?,
-            color: color(d.color),
-            intensity: intensity(d.intensity),
-        }),
-        (None, None, Some(s), None) => {
-            if s.inner.0 > s.outer.0 || s.outer.0 > 90.0 {
-                return Err((
-                    "lights",
-                    format!("a spot needs inner ≤ outer ≤ 90, not {} and {}", s.inner.0, s.outer.0),
-                ));
-            }
-            Ok(Light::Spot {
-                position: s.position.f32(),
-                direction: direction(s.direction)?,
-                inner_deg: s.inner.0 as f32,
-                outer_deg: s.outer.0 as f32,
-                color: color(s.color),
-                intensity: intensity(s.intensity),
-                falloff: falloff(s.falloff),
-            })
-        }
-        (None, None, None, Some(_)) => {
-            Err(("lights", "area lights are not supported by this version".to_string()))
-        }
-        _ => Err(("lights", "each light is one of point, directional, spot, area".to_string())),
-    }
-}
-
-fn materials(
-    map: Option<std::collections::BTreeMap<String, std::collections::BTreeMap<String, schema::MaterialWord>>>,
-) -> Result<Vec<MaterialOverride>, Wrong> {
-    let mut list = Vec::new();
-    for (name, words) in map.unwrap_or_default() {
-        if let Some(unknown) = words.keys().find(|w| !is_mtl_word(w)) {
-            return Err(("materials", format!("material {name}: `{unknown}` is not a word of an MTL")));
-        }
-        let words = words.into_iter().map(|(w, v)| (w, v.0)).collect();
-        list.push(MaterialOverride { name: name.into_bytes(), words });
-    }
-    Ok(list)
-}
-
-fn convert_layer(layer: schema::Layer, folder: &Path) -> Result<LayerFile, Wrong> {
-    let frames = layer.frames.unwrap_or(schema::LayerFrames {
-        start: None,
-        step: None,
-        outside: schema::Outside::Hold,
-    });
-    let step = frames.step.map_or(1, |s| s.0 as i64);
-    if step == 0 {
-        return Err((
-            "frames",
-            "a step of 0 never leaves the first frame; leave step out or give another".to_string(),
+/// The job's name becomes a folder's.
+fn plain_name(node: &Node) -> Read<String> {
+    let name = text(node)?;
+    if name.contains(['/', '\\']) || name == "." || name == ".." {
+        return Err(Wrong::at(
+            node,
+            format!("`{name}` is a path, not a name; `output: {{folder: …}}` takes one"),
         ));
     }
-    Ok(LayerFile {
-        sequence: folder.join(layer.sequence.0),
-        name: layer.name.map(|n| n.0),
-        placed: layer.transform.map(placed).transpose()?,
-        start: frames.start.map(|s| s.0 as i64),
-        step,
-        outside: match frames.outside {
-            schema::Outside::Hold => Outside::Hold,
-            schema::Outside::Loop => Outside::Loop,
-            schema::Outside::Hide => Outside::Hide,
-        },
-        materials: layer.materials.map(|m| folder.join(m.0)),
-    })
+    Ok(name)
 }
 
-fn placed(t: schema::Transform) -> Result<Placed, Wrong> {
-    let transform = |translate: Option<value::Triple<value::Any>>,
-                     rotate: Option<value::Triple<value::Any>>,
-                     scale: Option<value::Triple<value::Any>>| {
-        let part = |v: Option<value::Triple<value::Any>>, absent: DVec3| v.map_or(absent, |v| v.0);
-        Transform {
-            translate: part(translate, DVec3::ZERO),
-            rotate_deg: part(rotate, DVec3::ZERO),
-            scale: part(scale, DVec3::ONE),
-        }
+fn scene_options(map: &Fields<'_>) -> Read<Options> {
+    let mut options = Options {
+        lights: map.get("lights", scene::lights)?,
+        ambient: map.get("ambient", color)?,
+        background: map.get("background", background)?,
+        samples: map.get("samples", whole(limits::SAMPLES))?.map(|x| x as u32),
+        filter: map.get("filter", parsed(|w| one_of(&FILTERS, w)))?,
+        depth: map.get("depth", whole(limits::DEPTH))?.map(|x| x as u32),
+        seed: map.get("seed", whole(limits::U32))?.map(|x| x as u32),
+        up: map.get("up", scene::up)?,
+        exposure: map.get("exposure", number(limits::EXPOSURE))?.map(|x| x as f32),
+        smooth_angle: map.get("smooth_angle", number(limits::ANGLE))?.map(|x| x as f32),
+        aov: map.get("aov", aovs)?,
+        mtl_srgb: map.get("mtl_color", parsed(|w| one_of(&MTL_COLORS, w)))?,
+        prune: map.get("prune", number(limits::PRUNE))?.map(|x| x as f32),
+        materials: map.get("materials", scene::materials)?.unwrap_or_default(),
+        ..Options::default()
     };
-    let keys = match t.keys {
-        None => vec![Key { frame: 0.0, value: transform(t.translate, t.rotate, t.scale) }],
-        Some(_) if t.translate.is_some() || t.rotate.is_some() || t.scale.is_some() => {
-            return Err((
-                "transform",
-                "a transform with keys has translate, rotate and scale in the keys".to_string(),
-            ));
-        }
-        Some(keys) => keys
-            .into_iter()
-            .map(|k| Key { frame: k.frame.0, value: transform(k.translate, k.rotate, k.scale) })
-            .collect(),
+    options.camera = map.get("camera", |node| scene::camera(node, &mut options))?;
+    Ok(options)
+}
+
+fn picture_options(map: &Fields<'_>, options: &mut Options) -> Read<()> {
+    options.name = map.get("name", text)?;
+    options.format = map.get("format", parsed(settings::format_word))?;
+    options.size = map.get("size", size)?;
+    options.alpha = map.get("alpha", truth)?;
+    options.bits = map.get("bits", |node| {
+        let bits = whole(limits::BITS)(node)?;
+        settings::bits(bits).map_err(|e| Wrong::at(node, e))
+    })?;
+    options.quality = map.get("quality", whole(limits::QUALITY))?.map(|x| x as u8);
+    Ok(())
+}
+
+fn size(node: &Node) -> Read<[u32; 2]> {
+    let sides = list(whole(limits::SIDE))(node)?;
+    <[f64; 2]>::try_from(sides)
+        .map(|sides| sides.map(|x| x as u32))
+        .map_err(|_| Wrong::at(node, "expected two numbers of pixels, as [1280, 720]"))
+}
+
+fn background(node: &Node) -> Read<Vec3> {
+    if let Value::Text(_) = node.value {
+        let text = "background pictures are not supported by this version; give a colour, as [0, 0, 0]";
+        return Err(Wrong::at(node, text));
+    }
+    color(node)
+}
+
+/// A list of words, or words between commas.
+fn aovs(node: &Node) -> Read<AovSet> {
+    let words = match &node.value {
+        Value::List(_) => list(text)(node)?,
+        _ => text(node)?.split(',').map(|w| w.trim().to_string()).collect(),
     };
-    Ok(Placed { keys: ordered(keys, "transform")? })
+    settings::aovs(words.iter().map(String::as_str)).map_err(|e| Wrong::at(node, e))
+}
+
+fn override_of(node: &Node) -> Read<Override> {
+    let map = Fields::of(node, &[&["frames", "files"], &SCENE_KEYS, &PICTURE_KEYS])?;
+    let mut options = scene_options(&map)?;
+    picture_options(&map, &mut options)?;
+    Ok(Override { frames: map.get("frames", frames)?, files: map.get("files", pattern)?, options })
+}
+
+fn pattern(node: &Node) -> Read<Pattern> {
+    Ok(Pattern::new(text(node)?.as_bytes()))
+}
+
+fn layers(node: &Node, folder: &Path) -> Read<Vec<LayerFile>> {
+    let layers = list(|node: &Node| layer(node, folder))(node)?;
+    if layers.is_empty() {
+        return Err(Wrong::at(node, "the list of layers is empty"));
+    }
+    Ok(layers)
+}
+
+fn layer(node: &Node, folder: &Path) -> Read<LayerFile> {
+    let map = Fields::of(node, &[&["sequence", "name", "transform", "frames", "materials"]])?;
+    let path = |node: &Node| text(node).map(|p| folder.join(p));
+    let mut layer = LayerFile {
+        sequence: map.need("sequence", path)?,
+        name: map.get("name", text)?,
+        placed: map.get("transform", scene::placed)?,
+        start: None,
+        step: 1,
+        outside: Outside::Hold,
+        materials: map.get("materials", path)?,
+    };
+    map.get("frames", |node| {
+        let map = Fields::of(node, &[&["start", "step", "outside"]])?;
+        layer.start = map.get("start", whole(limits::FRAME))?.map(|x| x as i64);
+        layer.step = map.get("step", step)?.unwrap_or(1);
+        layer.outside = map.get("outside", parsed(|w| one_of(&OUTSIDES, w)))?.unwrap_or_default();
+        Ok(())
+    })?;
+    Ok(layer)
+}
+
+fn step(node: &Node) -> Read<i64> {
+    match whole(limits::FRAME)(node)? as i64 {
+        0 => Err(Wrong::at(node, "a step of 0 never leaves the first frame; leave it out or give another")),
+        step => Ok(step),
+    }
 }
 
 #[cfg(test)]

@@ -1,12 +1,14 @@
+use super::super::options::{CameraChoice, LightChoice};
 use super::*;
+use crate::math::DVec3;
 
-fn parsed(text: &str) -> JobFile {
-    parse(text, Path::new("jobs")).unwrap_or_else(|(place, e)| panic!("{place}: {e}"))
+fn read_text(yaml: &str) -> JobFile {
+    parse(yaml, Path::new("jobs")).unwrap_or_else(|e| panic!("{}:{}: {e}", e.line, e.column))
 }
 
 #[test]
 fn the_job_of_the_contract() {
-    let job = parsed(
+    let job = read_text(
         "version: 1
 name: walk
 layers:
@@ -56,39 +58,116 @@ overrides:
 }
 
 #[test]
-fn errors_have_a_place_what_is_allowed_and_the_nearest_name() {
-    let cases: &[(&str, &str, &[&str])] = &[
-        ("output: {sise: [64, 64]}", ":3:", &["sise", "size"]),
-        ("output:\n  sise: [64, 64]", ":4:3", &["sise", "did you mean `size`"]),
-        ("camera: {eye: [0, 0, 5], look_at: [0, 0, 0], fov: 400}", ":3:", &["fov", "400", "179"]),
-        ("camera:\n  eye: [0, 0, 5]\n  look_at: [0, 0, 0]\n  fov: 400", ":6:8", &["fov", "400", "179"]),
-        ("camera:\n  keys:\n    - {frame: 1, eye: [0, 0], look_at: [0, 0, 0]}", ":5:", &["three numbers"]),
-        ("samples: many", ":3:10", &["samples", "whole number"]),
-        ("samples: 0", ":3:10", &["samples", "out of range"]),
-        ("samples: 1.5", ":3:10", &["samples", "whole"]),
-        ("filter: bx", ":3:9", &["bx", "did you mean `box`"]),
-        ("lights:\n  - pont: {position: [0, 1, 0]}", ":4:", &["pont", "did you mean `point`"]),
-        ("lights:\n  - area: {material: all}", ":3:1", &["area lights are not supported"]),
-        ("camera: {eye: [0, 0, 5]}", ":3:1", &["look_at"]),
-        ("output: {format: gif}", ":3:", &["gif", "png"]),
-        ("frames: 1-", ":3:9", &["1-"]),
-        ("materials: {a: {Kx: 1}}", ":3:1", &["Kx"]),
-        ("ambient: [0, -1, 0]", ":3:", &["ambient", "out of range"]),
-        ("sequence: b/", ":3:1", &["duplicate", "sequence"]),
-        ("version: 2", "", &["duplicate", "version"]),
+fn errors_have_line_and_column_what_is_allowed_and_the_nearest_name() {
+    // the third line of a job, where the error is, and what is told
+    let cases: &[(&str, (u64, u64), &[&str])] = &[
+        ("output: {sise: [64, 64]}", (3, 10), &["output", "sise", "did you mean `size`", "quality"]),
+        ("output:\n  sise: [64, 64]", (4, 3), &["sise", "size"]),
+        ("sampels: 3", (3, 1), &["sampels", "did you mean `samples`"]),
+        ("camera: {eye: [0, 0, 5], look_at: [0, 0, 0], fov: 400}", (3, 51), &["fov", "400", "0.01 to 179"]),
+        ("camera:\n  eye: [0, 0, 5]\n  look_at: [0, 0, 0]\n  fov: 400", (6, 8), &["fov", "400"]),
+        ("camera:\n  keys:\n    - {frame: 1, eye: [0, 0], look_at: [0, 0, 0]}", (5, 23), &["eye", "three"]),
+        ("camera: {eye: [0, 0, 5]}", (3, 9), &["camera", "look_at", "missing"]),
+        ("camera: {eye: [0, 0, 5], look_at: [0, 0, 5]}", (3, 9), &["camera", "same point"]),
+        ("camera: {keys: []}", (3, 16), &["keys", "empty"]),
+        ("camera:\n  keys:\n    - {frame: 1, eye: 1, look_at: 0}", (5, 23), &["eye", "three numbers"]),
+        ("camera: {gltf: Main}", (3, 16), &["glTF cameras are not supported by this version"]),
+        ("camera: front", (3, 9), &["camera", "a map", "front"]),
+        ("samples: many", (3, 10), &["samples", "a whole number from 1 to 65536", "many"]),
+        ("samples: 0", (3, 10), &["samples", "out of range", "1 to 65536"]),
+        ("samples: 1.5", (3, 10), &["samples", "whole"]),
+        ("samples:", (3, 8), &["samples", "nothing"]),
+        ("samples: '4'", (3, 10), &["samples", "whole number", "the text `4`"]),
+        ("seed: 4294967296", (3, 7), &["seed", "out of range"]),
+        ("exposure: .nan", (3, 11), &[".nan"]),
+        ("filter: bx", (3, 9), &["filter", "bx", "did you mean `box`"]),
+        ("up: x", (3, 5), &["up", "y, z"]),
+        ("up: [0, 0, 0]", (3, 5), &["up", "direction"]),
+        ("name: 7", (3, 7), &["name", "quotes"]),
+        ("name: ../x", (3, 7), &["name", "path"]),
+        ("lights:\n  - pont: {position: [0, 1, 0]}", (4, 5), &["pont", "did you mean `point`"]),
+        ("lights: [{point: {}}]", (3, 18), &["position", "missing"]),
+        ("lights:\n  - area: {material: all}", (4, 11), &["area lights are not supported by this version"]),
+        (
+            "lights: [{point: {position: [0, 0, 0], falloff: inverse}}]",
+            (3, 49),
+            &["falloff", "inverse-square"],
+        ),
+        (
+            "lights: [{spot: {position: [0,0,0], direction: [0,1,0], inner: 30, outer: 20}}]",
+            (3, 17),
+            &["inner is 30"],
+        ),
+        ("background: sky.hdr", (3, 13), &["background pictures are not supported by this version"]),
+        ("output: {format: gif}", (3, 18), &["format", "gif", "png"]),
+        ("output: {bits: 12}", (3, 16), &["bits", "8 or 16"]),
+        ("output: {size: [1280]}", (3, 16), &["size", "two numbers"]),
+        ("output: {size: [1280, 0]}", (3, 23), &["size", "out of range"]),
+        ("output: {alpha: 1}", (3, 17), &["alpha", "true or false"]),
+        ("output: 3", (3, 9), &["output", "a map"]),
+        ("frames: 1-", (3, 9), &["frames", "1-"]),
+        ("aov: [depth, norml]", (3, 6), &["aov", "norml", "did you mean `normal`"]),
+        ("materials: {a: {Kx: 1}}", (3, 17), &["material a", "Kx"]),
+        ("ambient: [0, -1, 0]", (3, 10), &["ambient", "out of range"]),
+        ("overrides:\n  - {frames: 1, samples: 2}\n  - {frames: 2, samples: x}", (5, 26), &["samples"]),
+        ("overrides: [{folder: a}]", (3, 14), &["unknown key `folder`"]),
+        ("layers: [{sequence: b}]", (3, 9), &["either `sequence` or `layers`"]),
+        ("sequence: b/", (3, 1), &["duplicate", "sequence"]),
+        ("output: {bits: 8, bits: 16}", (3, 19), &["duplicate", "bits"]),
+        ("output: [1, 2\nsamples: 1", (4, 8), &["':'"]),
+        ("name: \"x", (3, 7), &["unclosed quote"]),
     ];
-    for (line, place, words) in cases {
-        let (at, text) = parse(&format!("version: 1\nsequence: a/\n{line}\n"), Path::new("")).unwrap_err();
-        assert!(at.starts_with(place), "{line}: at {at}: {text}");
-        assert!(words.iter().all(|w| text.contains(w)), "{line}: {text}");
+    let told: Vec<String> = cases
+        .iter()
+        .filter_map(|(line, place, words)| {
+            let e = parse(&format!("version: 1\nsequence: a/\n{line}\n"), Path::new("")).unwrap_err();
+            let is_right = (e.line, e.column) == *place && words.iter().all(|w| e.to_string().contains(w));
+            (!is_right).then(|| format!("{line} → {}:{}: {e}", e.line, e.column))
+        })
+        .collect();
+    assert!(told.is_empty(), "{}", told.join("\n"));
+}
+
+#[test]
+fn errors_of_layers_and_of_the_whole() {
+    let cases: &[(&str, (u64, u64), &str)] = &[
+        ("version: 1\n", (1, 1), "needs `sequence` or `layers`"),
+        ("", (1, 1), "a map"),
+        ("- a\n- b\n", (1, 1), "a map"),
+        ("sequence: a\nversion: 2\n", (2, 10), "version 1"),
+        ("layers: []\n", (1, 9), "empty"),
+        ("layers:\n  - name: a\n", (2, 5), "`sequence` is missing"),
+        ("layers:\n  - sequence: a\n    frames: {outside: stop}\n", (3, 23), "hold, loop, hide"),
+        ("layers:\n  - sequence: a\n    frames: {step: 0}\n", (3, 20), "step"),
+        ("layers: [{sequence: a, transform: {scale: big}}]\n", (1, 43), "scale"),
+        (
+            "layers: [{sequence: a, transform: {keys: [{frame: 1}, {frame: 1}]}}]\n",
+            (1, 55),
+            "another key at frame 1",
+        ),
+        ("layers: [{sequence: a, transform: {keys: [{frame: 1}], scale: 2}}]\n", (1, 35), "in the keys"),
+        ("sequence: a\n---\nsequence: b\n", (3, 1), "multiple"),
+    ];
+    for (yaml, place, words) in cases {
+        let e = parse(yaml, Path::new("")).unwrap_err();
+        let is_right = (e.line, e.column) == *place && e.to_string().contains(words);
+        assert!(is_right, "{yaml} → {}:{}: {e}", e.line, e.column);
     }
 }
 
 #[test]
-fn a_job_has_a_sequence_or_layers() {
-    assert!(parse("version: 1\n", Path::new("")).is_err());
-    assert!(parse("sequence: a\nlayers: [{sequence: b}]\n", Path::new("")).is_err());
-    assert!(parse("version: 2\nsequence: a\n", Path::new("")).unwrap_err().1.contains("version 1"));
-    assert!(parse("", Path::new("")).is_err());
-    assert!(parse("- a\n- b\n", Path::new("")).is_err());
+fn hostile_yaml_is_refused_quickly() {
+    let laughs: String = (1..12)
+        .map(|i| format!("a{i}: &a{i} [{}]\n", format!("*a{},", i - 1).repeat(10)))
+        .fold("a0: &a0 [x, x]\n".to_string(), |all, line| all + &line);
+    for yaml in [laughs, "[".repeat(100_000), "{a: ".repeat(100_000), "a: &a [*a]".to_string()] {
+        assert!(parse(&yaml, Path::new("")).is_err());
+    }
+}
+
+#[test]
+fn up_and_fov_alone_are_of_the_auto_camera() {
+    let job = read_text("sequence: a\ncamera: {fov: 25, up: z}\n");
+    assert_eq!(job.options.camera, Some(CameraChoice::Auto));
+    assert_eq!((job.options.fov, job.options.up), (Some(25.0), Some(DVec3::Z)));
 }
