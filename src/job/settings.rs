@@ -4,7 +4,7 @@ use super::options::{CameraChoice, LightChoice, Options, limits};
 use super::track::{CameraPose, CameraTrack, Interpolation, Key};
 use crate::format::ReadOptions;
 use crate::math::{DVec3, Vec3};
-use crate::scene::{Aov, AovSet, Camera, Filter, Light, Shot};
+use crate::scene::{Aov, AovSet, Background, Camera, Filter, Light, Shot};
 
 /// Picture formats of this version, by their words.
 pub const FORMATS: [&str; 3] = ["png", "exr", "ppm"];
@@ -94,7 +94,7 @@ impl Settings {
             camera,
             lights,
             ambient: self.ambient,
-            background: self.background,
+            background: Background::Color(self.background),
             size: self.size,
             samples: self.samples,
             filter: self.filter,
