@@ -4,7 +4,7 @@ use super::RunOptions;
 use super::read::read_options;
 use super::source::Sources;
 use crate::format;
-use crate::job::{Job, LightChoice, Picture, Sequence, auto};
+use crate::job::{Background, Job, LightChoice, Picture, Sequence, auto};
 use crate::math::Bounds;
 use crate::scene::{Camera, Light, Object, Shot};
 use crate::warning::Warnings;
@@ -53,12 +53,21 @@ pub(super) fn prepare(job: &Job, options: &RunOptions) -> Prepared {
 
 impl Prepared {
     /// The shot of a picture.
-    pub(super) fn shot(&self, picture: &Picture) -> Shot {
+    pub(super) fn shot(&self, picture: &Picture) -> Result<Shot, String> {
         let lights = match &picture.settings.lights {
             LightChoice::Given(lights) => lights.clone(),
             LightChoice::Auto => self.sequences[picture.sequence].light.into_iter().collect(),
         };
-        picture.settings.shot(self.camera(picture), lights)
+        let background = match &picture.settings.background {
+            Background::Color(color) => *color,
+            Background::File(path) => {
+                return Err(format!(
+                    "{}: background pictures are not rendered by this version; give a colour",
+                    path.display()
+                ));
+            }
+        };
+        Ok(picture.settings.shot(self.camera(picture), lights, background))
     }
 
     fn camera(&self, picture: &Picture) -> Camera {

@@ -101,7 +101,13 @@ impl<'a> Reader<'a> {
             }
         };
         report.triangles = frame.triangles();
-        let shot = self.prepared.shot(picture);
+        let shot = match self.prepared.shot(picture) {
+            Ok(shot) => shot,
+            Err(error) => {
+                report.error = Some(error);
+                return Err(report);
+            }
+        };
         let encoding = encoding(&picture.settings);
         let fingerprint = fingerprint(&frame, &shot, encoding);
         if !self.options.overwrite && self.records.finished(&picture.picture, fingerprint) {
@@ -211,9 +217,6 @@ fn warn_of_materials(path: &Path, loaded: &Loaded, warnings: &mut Warnings) {
                 None,
                 format!("illum {} is rendered as illum {other} by this version", m.illum),
             );
-        }
-        if !m.maps.is_empty() {
-            warnings.add(None, None, "textures are not rendered by this version; the constants are used");
         }
     }
     let has_faces = !g.triangles.0.is_empty();

@@ -1,7 +1,7 @@
 //! The keys of the job file as serde reads them. Unknown ones are errors everywhere.
 
 use super::value::{
-    Angle, Any, Color, Depth, Exposure, Format, Fov, Frame, Frames, Number, Prune, Quality, Samples, Side,
+    Angle, Any, Color, ColorOrFile, Depth, Exposure, Format, Fov, Frame, Frames, Number, Prune, Quality, Samples, Side,
     Triple, Up, Whole, Word,
 };
 use crate::job::track::Interpolation;
@@ -21,7 +21,7 @@ macro_rules! with_scene_keys {
             pub camera: Option<Choice<Camera>>,
             pub lights: Option<Choice<Vec<Light>>>,
             pub ambient: Option<Triple<Color>>,
-            pub background: Option<Triple<Color>>,
+            pub background: Option<ColorOrFile>,
             pub samples: Option<Number<Samples>>,
             pub filter: Option<Filter>,
             pub depth: Option<Number<Depth>>,
