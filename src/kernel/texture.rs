@@ -132,7 +132,9 @@ pub fn sphere(map: &Map, direction: Vec3) -> Vec3 {
     let [x, y, z] = direction.to_array().map(f64::from);
     let u = 0.5 + libm::atan2(x, -z) / std::f64::consts::TAU;
     let v = 0.5 + libm::asin(y.clamp(-1.0, 1.0)) / std::f64::consts::PI;
-    color_of(map, Vec2::new(u as f32, v as f32), 0.0)
+    // around it repeats, above and below it ends
+    let half_texel = 0.5 / map.texture.size[1] as f32;
+    color_of(map, Vec2::new(u as f32, (v as f32).clamp(half_texel, 1.0 - half_texel)), 0.0)
 }
 
 /// A cube of pictures in a direction: faces −x, +x, −y, +y, −z, +z as seen from inside; a missing one is black.

@@ -2,7 +2,7 @@
 //! claimed for a picture that is not there.
 
 use super::event::{FrameReport, Status};
-use super::read::encoding;
+use super::read::{encoding, read_options};
 use super::report::Report;
 use super::{RunError, RunOptions};
 use crate::format;
@@ -42,7 +42,8 @@ fn input_files(job: &Job) -> HashSet<PathBuf> {
         for source in &picture.sources {
             let Some(file) = source.file else { continue };
             let layer = &sequence.layers[source.layer];
-            for named in format::named_files(&layer.files[file].path, layer.materials.as_deref()) {
+            let read = read_options(picture, layer.materials.as_deref(), false);
+            for named in format::named_files(&layer.files[file].path, &read) {
                 files.extend(real(&named));
             }
         }

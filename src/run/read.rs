@@ -100,7 +100,13 @@ impl<'a> Reader<'a> {
             }
         };
         report.triangles = frame.triangles();
-        let shot = self.prepared.shot(picture);
+        let shot = match self.prepared.shot(picture) {
+            Ok(shot) => shot,
+            Err(error) => {
+                report.error = Some(error);
+                return Err(report);
+            }
+        };
         let encoding = encoding(&picture.settings);
         let fingerprint = fingerprint(&frame, &shot, encoding);
         if !self.options.overwrite && self.records.finished(&picture.picture, fingerprint) {
@@ -203,11 +209,6 @@ pub fn read_frame(
 /// Names what of the materials is not rendered as it says, and frames that nothing can be seen of.
 fn warn_of_materials(path: &Path, loaded: &Loaded, warnings: &mut Warnings) {
     let g = &loaded.geometry;
-    for m in &g.materials {
-        if !m.maps.is_empty() {
-            warnings.add(None, None, "textures are not rendered by this version; the constants are used");
-        }
-    }
     let has_faces = !g.triangles.0.is_empty();
     let is_seen = |run: &[u32; 2]| g.materials.get(run[1] as usize).is_none_or(|m| m.d > 0.0);
     if has_faces && !g.material_runs.0.iter().any(is_seen) {

@@ -5,7 +5,7 @@ mod value;
 
 use super::JobError;
 use super::numbers::FrameSet;
-use super::options::{CameraChoice, LightChoice, Options};
+use super::options::{Background, CameraChoice, LightChoice, Options};
 use super::settings;
 use super::track::{CameraPose, CameraTrack, Key, Placed, Transform};
 use crate::format::{MaterialOverride, is_mtl_word};
@@ -71,15 +71,14 @@ pub(super) fn read(path: &Path) -> Result<JobFile, JobError> {
         });
     }
     let text = std::fs::read_to_string(path).map_err(unreadable)?;
-    let folder = path.parent().unwrap_or(Path::new(""));
-    parse(&text, folder).map_err(|(place, text)| JobError::File { path: path.to_path_buf(), place, text })
+    parse(&text, path).map_err(|(place, text)| JobError::File { path: path.to_path_buf(), place, text })
 }
 
 /// No job file is larger.
 const MAX_BYTES: u64 = 1 << 20;
 
-/// Paths are relative to the folder. An error is its place, as `:3:12`, and its text.
-fn parse(text: &str, folder: &Path) -> Result<JobFile, (String, String)> {
+/// Paths are relative to the file's folder. An error is its place, as `:3:12`, and its text.
+fn parse(text: &str, path: &Path) -> Result<JobFile, (String, String)> {
     let job: schema::Job = serde_yaml::from_str(text).map_err(|e| {
         let told = e.to_string();
         // of a key that stands twice serde tells only where its map begins
@@ -89,7 +88,7 @@ fn parse(text: &str, folder: &Path) -> Result<JobFile, (String, String)> {
         (place.unwrap_or_default(), plainly(&told))
     })?;
     // these are checks between values; the line is that of the key they are about
-    convert(job, folder).map_err(|(key, wrong)| (line_of(text, key, false), wrong))
+    convert(job, path).map_err(|(key, wrong)| (line_of(text, key, false), wrong))
 }
 
 /// The first or last line that begins with a key, as `:3:1`.
@@ -140,11 +139,16 @@ fn distance(a: &str, b: &str) -> usize {
 type Wrong = (&'static str, String);
 
 macro_rules! scene_options {
-    ($options:ident, $from:ident) => {
+    ($options:ident, $from:ident, $path:ident) => {
         $options.camera = $from.camera.map(camera).transpose()?;
         $options.lights = $from.lights.map(lights).transpose()?;
         $options.ambient = $from.ambient.map(|t| t.f32());
-        $options.background = $from.background.map(|t| t.f32());
+        $options.background = $from.background.map(|b| match b {
+            value::ColorOrFile::Color(color) => Background::Color(color.f32()),
+            value::ColorOrFile::File(file) => {
+                Background::File($path.parent().unwrap_or(Path::new("")).join(file))
+            }
+        });
         $options.samples = $from.samples.map(|n| n.0 as u32);
         $options.filter = $from.filter;
         $options.depth = $from.depth.map(|n| n.0 as u32);
@@ -157,7 +161,7 @@ macro_rules! scene_options {
         if let Some(words) = &$from.aov {
             $options.aov = Some(settings::aovs(words.iter().map(|w| w.0.as_str())).map_err(|e| ("aov", e))?);
         }
-        $options.materials = materials($from.materials)?;
+        $options.materials = materials($from.materials, $path)?;
     };
 }
 
@@ -172,7 +176,8 @@ macro_rules! output_options {
     };
 }
 
-fn convert(job: schema::Job, folder: &Path) -> Result<JobFile, Wrong> {
+fn convert(job: schema::Job, path: &Path) -> Result<JobFile, Wrong> {
+    let folder = path.parent().unwrap_or(Path::new(""));
     if job.version.as_ref().is_some_and(|v| v.0 != 1.0) {
         return Err(("version", "this version of rentix reads job files of version 1".to_string()));
     }
@@ -180,7 +185,7 @@ fn convert(job: schema::Job, folder: &Path) -> Result<JobFile, Wrong> {
         return Err(("sequence", "a job has either `sequence` or `layers`".to_string()));
     }
     let mut options = Options::default();
-    scene_options!(options, job);
+    scene_options!(options, job, path);
     let mut file = JobFile {
         name: job.name.map(|n| n.0),
         sequence: job.sequence.map(|s| folder.join(s.0)),
@@ -197,7 +202,7 @@ fn convert(job: schema::Job, folder: &Path) -> Result<JobFile, Wrong> {
     }
     for o in job.overrides.unwrap_or_default() {
         let mut options = Options::default();
-        scene_options!(options, o);
+        scene_options!(options, o, path);
         output_options!(options, o);
         file.overrides.push(Override { frames: o.frames.map(|f| f.0), files: o.files.map(|f| f.0), options });
     }
@@ -298,8 +303,9 @@ fn light(l: schema::Light) -> Result<Light, Wrong> {
                 falloff: falloff(s.falloff),
             })
         }
-        (None, None, None, Some(_)) => {
-            Err(("lights", "area lights are not supported by this version".to_string()))
+        (None, None, None, Some(a)) => {
+            let (Some(schema::AllMaterials::All) | None) = a.material;
+            Ok(Light::Area { samples: a.samples.map_or(1, |n| n.0 as u32) })
         }
         _ => Err(("lights", "each light is one of point, directional, spot, area".to_string())),
     }
@@ -307,6 +313,7 @@ fn light(l: schema::Light) -> Result<Light, Wrong> {
 
 fn materials(
     map: Option<std::collections::BTreeMap<String, std::collections::BTreeMap<String, schema::MaterialWord>>>,
+    path: &Path,
 ) -> Result<Vec<MaterialOverride>, Wrong> {
     let mut list = Vec::new();
     for (name, words) in map.unwrap_or_default() {
@@ -314,7 +321,7 @@ fn materials(
             return Err(("materials", format!("material {name}: `{unknown}` is not a word of an MTL")));
         }
         let words = words.into_iter().map(|(w, v)| (w, v.0)).collect();
-        list.push(MaterialOverride { name: name.into_bytes(), words });
+        list.push(MaterialOverride { name: name.into_bytes(), words, said_in: path.to_path_buf() });
     }
     Ok(list)
 }

@@ -1,8 +1,8 @@
 //! The keys of the job file as serde reads them. Unknown ones are errors everywhere.
 
 use super::value::{
-    Angle, Any, Color, Depth, Exposure, Format, Fov, Frame, Frames, Number, Prune, Quality, Samples, Side,
-    Triple, Up, Whole, Word,
+    Angle, Any, Color, ColorOrFile, Depth, Exposure, Format, Fov, Frame, Frames, Number, Prune, Quality,
+    Samples, Side, Triple, Up, Whole, Word,
 };
 use crate::job::track::Interpolation;
 use crate::scene::Filter;
@@ -21,7 +21,7 @@ macro_rules! with_scene_keys {
             pub camera: Option<Choice<Camera>>,
             pub lights: Option<Choice<Vec<Light>>>,
             pub ambient: Option<Triple<Color>>,
-            pub background: Option<Triple<Color>>,
+            pub background: Option<ColorOrFile>,
             pub samples: Option<Number<Samples>>,
             pub filter: Option<Filter>,
             pub depth: Option<Number<Depth>>,
@@ -156,7 +156,7 @@ pub(super) struct Light {
     pub point: Option<Point>,
     pub directional: Option<Directional>,
     pub spot: Option<Spot>,
-    pub area: Option<de::IgnoredAny>,
+    pub area: Option<Area>,
 }
 
 #[derive(Clone, Copy, Deserialize, Default)]
@@ -183,6 +183,20 @@ pub(super) struct Directional {
     pub direction: Triple<Any>,
     pub color: Option<Triple<Color>>,
     pub intensity: Option<Number<Color>>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Area {
+    pub material: Option<AllMaterials>,
+    pub samples: Option<Number<Samples>>,
+}
+
+/// Which materials' triangles are meant: those of all.
+#[derive(Clone, Copy, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub(super) enum AllMaterials {
+    All,
 }
 
 #[derive(Deserialize)]

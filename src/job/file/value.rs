@@ -114,6 +114,42 @@ impl<'de, R: Range> Deserialize<'de> for Triple<R> {
     }
 }
 
+/// A colour, or a picture's file.
+pub(super) enum ColorOrFile {
+    /// Three numbers, or one for all three.
+    Color(Triple<Color>),
+    /// Its name as written.
+    File(String),
+}
+
+impl<'de> Deserialize<'de> for ColorOrFile {
+    fn deserialize<D: Deserializer<'de>>(d: D) -> Result<Self, D::Error> {
+        struct Either;
+        impl<'de> Visitor<'de> for Either {
+            type Value = ColorOrFile;
+            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                f.write_str("a colour, as [0, 0, 0], or a picture's file, as sky.hdr")
+            }
+            fn visit_str<E: de::Error>(self, s: &str) -> Result<ColorOrFile, E> {
+                Ok(ColorOrFile::File(s.to_string()))
+            }
+            fn visit_seq<A: SeqAccess<'de>>(self, list: A) -> Result<ColorOrFile, A::Error> {
+                Triple::deserialize(de::value::SeqAccessDeserializer::new(list)).map(ColorOrFile::Color)
+            }
+            fn visit_f64<E: de::Error>(self, x: f64) -> Result<ColorOrFile, E> {
+                Triple::deserialize(de::value::F64Deserializer::new(x)).map(ColorOrFile::Color)
+            }
+            fn visit_u64<E: de::Error>(self, x: u64) -> Result<ColorOrFile, E> {
+                self.visit_f64(x as f64)
+            }
+            fn visit_i64<E: de::Error>(self, x: i64) -> Result<ColorOrFile, E> {
+                self.visit_f64(x as f64)
+            }
+        }
+        d.deserialize_any(Either)
+    }
+}
+
 /// A word or a number, read by a function; the error says what is allowed.
 macro_rules! from_text {
     ($($name:ident($kind:ty), $expecting:literal, $parse:expr;)*) => {
