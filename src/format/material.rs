@@ -156,14 +156,15 @@ mod tests {
             alpha_varies: false,
             texels: Texels::U8(vec![[255; 4]]),
         });
-        let maps = [&mut given, &mut changes].into_iter().flat_map(|given| std::mem::take(&mut given.maps));
-        let maps = maps.map(|(slot, statement)| FoundMap {
+        let statements = [std::mem::take(&mut given.maps), std::mem::take(&mut changes.maps)].concat();
+        let found = |(slot, statement)| FoundMap {
             slot,
             statement,
             said_in: PathBuf::new(),
             path: None,
             texture: Some(white.clone()),
-        });
+        };
+        let maps = statements.into_iter().map(found);
         let mut said = Vec::new();
         let material =
             material(given, changes, maps.collect(), false, &mut |text| said.push(text.to_owned()));
@@ -186,7 +187,8 @@ mod tests {
         let (m, said) = of(&maps, &[]);
         assert_eq!((m.ka, m.kd, m.ks, m.ke, m.ns, m.d), ([1.0; 3], [1.0; 3], [1.0; 3], [1.0; 3], 1.0, 1.0));
         assert_eq!((m.illum, said.len()), (2, 0));
-        let (black, said) = of(&[("Kd", "0 0 0"), ("Ks", "0 0 0"), ("map_Kd", "a.png"), ("map_Ks", "a.png")], &[]);
+        let (black, said) =
+            of(&[("Kd", "0 0 0"), ("Ks", "0 0 0"), ("map_Kd", "a.png"), ("map_Ks", "a.png")], &[]);
         assert_eq!((black.kd, black.ks, said.len()), ([1.0; 3], [0.0; 3], 1));
         assert_eq!(of(&[("Kd", "0 0 0")], &[]).0.kd, [0.0; 3]);
     }
@@ -224,6 +226,10 @@ mod tests {
         let material = filled_in(&given, Textures::default(), true);
         assert!((material.kd[0] - 0.214_041_14).abs() < 1e-6);
         assert_eq!((material.kd[1], material.kd[2], material.ke), (0.0, 1.0, [17.0; 3]));
-        assert_eq!(filled_in(&Given::default(), Textures::default(), true).kd, [0.8; 3], "a default is linear");
+        assert_eq!(
+            filled_in(&Given::default(), Textures::default(), true).kd,
+            [0.8; 3],
+            "a default is linear"
+        );
     }
 }

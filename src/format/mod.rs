@@ -83,8 +83,7 @@ pub fn load_obj(path: &Path, options: &ReadOptions, textures: &TextureCache) -> 
     let mut warnings = Warnings::default();
     let lines = obj::Lines::new(&text, path, options.lenient, &mut warnings)?;
     let mut loader = library::Loader::new(path, options);
-    let library =
-        loader.library(lines.libraries(), lines.used_materials(), textures, &mut warnings)?;
+    let library = loader.library(lines.libraries(), lines.used_materials(), textures, &mut warnings)?;
     let parsed = lines.into_parsed(&library, options, &mut warnings);
     let inputs = std::iter::once(path.to_path_buf()).chain(loader.inputs).collect();
     Ok(Loaded {

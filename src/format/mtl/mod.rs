@@ -61,7 +61,11 @@ pub(super) fn parse(text: &Text, is_wanted: impl Fn(&[u8]) -> bool) -> Parsed {
         let (word, value) = first_word(without_comment(line));
         if word == b"newmtl" {
             nobody = Given::default();
-            current = if is_wanted(value) { parsed.materials.entry(value.to_vec()).or_default() } else { &mut nobody };
+            current = if is_wanted(value) {
+                parsed.materials.entry(value.to_vec()).or_default()
+            } else {
+                &mut nobody
+            };
             *current = Given::default();
         } else if !word.is_empty() {
             match current.set(word, value) {

@@ -151,11 +151,7 @@ pub(in crate::format) enum Refusal {
 impl Given {
     /// Takes one statement; gives the word or the options in it that change nothing. Words are known in any case; said
     /// again, the last stands.
-    pub(in crate::format) fn set(
-        &mut self,
-        word: &[u8],
-        value: &[u8],
-    ) -> Result<Vec<&'static str>, Refusal> {
+    pub(in crate::format) fn set(&mut self, word: &[u8], value: &[u8]) -> Result<Vec<&'static str>, Refusal> {
         let (known, takes) = WORDS
             .iter()
             .find(|(known, _)| word.eq_ignore_ascii_case(known.as_bytes()))

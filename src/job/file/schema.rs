@@ -1,8 +1,8 @@
 //! The keys of the job file as serde reads them. Unknown ones are errors everywhere.
 
 use super::value::{
-    Angle, Any, Color, ColorOrFile, Depth, Exposure, Format, Fov, Frame, Frames, Number, Prune, Quality, Samples, Side,
-    Triple, Up, Whole, Word,
+    Angle, Any, Color, ColorOrFile, Depth, Exposure, Format, Fov, Frame, Frames, Number, Prune, Quality,
+    Samples, Side, Triple, Up, Whole, Word,
 };
 use crate::job::track::Interpolation;
 use crate::scene::Filter;
