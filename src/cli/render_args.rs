@@ -84,8 +84,8 @@ pub(super) struct RenderArgs {
     /// Ambient light, R,G,B or one number [default: 0.1]
     #[arg(long, value_name = "R,G,B", help_heading = "Scene")]
     pub ambient: Option<String>,
-    /// Background colour, R,G,B or one number [default: 0]
-    #[arg(long, value_name = "R,G,B", help_heading = "Scene")]
+    /// Background, R,G,B or one number, or a picture by latitude and longitude [default: 0]
+    #[arg(long, value_name = "R,G,B|FILE", help_heading = "Scene")]
     pub background: Option<String>,
     /// Smooth normals over edges below this angle where the file has none, degrees
     #[arg(long, value_name = "DEG", help_heading = "Scene")]

@@ -254,12 +254,11 @@ impl<'a> Loader<'a> {
         }
         let loaded: HashMap<_, _> = wanted.into_iter().zip(loaded).collect();
         for map in maps.iter_mut().flatten() {
-            let name = shown(&map.statement.file);
             let texture = match &map.path {
-                None => Err(format!("`{name}` is not found")),
+                None => Err(format!("`{}` is not found", shown(&map.statement.file))),
                 Some(path) => match loaded.get(&(path.clone(), map.slot.texture_use())).map(|l| &l.texture) {
                     Some(Ok(texture)) => Ok(texture.clone()),
-                    Some(Err(why)) => Err(format!("`{name}`: {why}")),
+                    Some(Err(why)) => Err(why.clone()),
                     None => continue,
                 },
             };

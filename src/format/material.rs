@@ -156,14 +156,15 @@ mod tests {
             alpha_varies: false,
             texels: Texels::U8(vec![[255; 4]]),
         });
-        let maps = [&mut given, &mut changes].into_iter().flat_map(|given| std::mem::take(&mut given.maps));
-        let maps = maps.map(|(slot, statement)| FoundMap {
+        let statements = [std::mem::take(&mut given.maps), std::mem::take(&mut changes.maps)].concat();
+        let found = |(slot, statement)| FoundMap {
             slot,
             statement,
             said_in: PathBuf::new(),
             path: None,
             texture: Some(white.clone()),
-        });
+        };
+        let maps = statements.into_iter().map(found);
         let mut said = Vec::new();
         let material =
             material(given, changes, maps.collect(), false, &mut |text| said.push(text.to_owned()));

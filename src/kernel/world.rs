@@ -3,7 +3,7 @@
 
 use super::material::MaterialRecord;
 use super::power::powf;
-use crate::accel::{Aabb, Hit, Placement, Ray, hit_point, magnitude};
+use crate::accel::{Aabb, Hit, Placement, Ray, extent, hit_point, magnitude};
 use crate::math::{DAffine3, DMat3, Mat3, Vec2, Vec3};
 use crate::scene::{ABSENT, Frame, Geometry, Material, Object, Part, Reflection, Textures};
 
@@ -93,7 +93,8 @@ impl<'a> World<'a> {
             }
             Some(t) => {
                 let [a, b, c] = corners.map(|i| t.placement.magnitude(vertex(i)));
-                (corners.map(|i| t.placement.point(vertex(i))), a.max(b).max(c), t.orientation)
+                let p = corners.map(|i| t.placement.point(vertex(i)));
+                (p, a.max(b).max(c) + extent(&p), t.orientation)
             }
         };
         let ng = orientation * triangle_normal(p, -ray.direction);

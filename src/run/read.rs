@@ -200,10 +200,11 @@ fn load_frame(
 pub fn read_frame(
     job: &Job,
     picture: &Picture,
+    sources: &Sources,
     lenient: bool,
     warnings: &mut Warnings,
 ) -> Result<Frame, String> {
-    load_frame(job, picture, &Sources::default(), lenient, false, warnings).map(|l| l.frame)
+    load_frame(job, picture, sources, lenient, false, warnings).map(|l| l.frame)
 }
 
 /// Names what of the materials is not rendered as it says, and frames that nothing can be seen of.

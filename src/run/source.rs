@@ -20,7 +20,7 @@ struct Kept {
 /// Files that will be used again: still layers for the whole run, first frames that were read for their lights until
 /// their turn comes, and textures as long as frames use them.
 #[derive(Default)]
-pub(super) struct Sources {
+pub struct Sources {
     kept: Mutex<HashMap<PathBuf, Kept>>,
     textures: TextureCache,
 }

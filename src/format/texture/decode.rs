@@ -2,7 +2,7 @@
 
 use exr::meta::header::Header;
 use exr::prelude::{AnyChannel, FlatSamples, MetaData, ReadChannels, ReadLayers, read};
-use image::{DynamicImage, ImageDecoder, ImageFormat, ImageReader, Limits};
+use image::{DynamicImage, ImageDecoder, ImageError, ImageFormat, ImageReader, Limits};
 use std::io::Cursor;
 use std::path::Path;
 
@@ -12,7 +12,6 @@ pub(super) const MAX_SIDE: u32 = 16_384;
 pub(super) const MAX_BYTES: u64 = 1 << 30;
 
 const EXR_MAGIC: [u8; 4] = [0x76, 0x2f, 0x31, 0x01];
-const DDS_MAGIC: &[u8] = b"DDS ";
 
 /// The largest number of a half, what an infinite texel becomes: sums and products of it stay finite.
 const MAX_HALF: f32 = 65_504.0;
@@ -59,20 +58,19 @@ fn check_size(width: u64, height: u64, texel_bytes: u64) -> Result<(), String> {
 }
 
 fn decode_image(bytes: &[u8], path: &Path) -> Result<Picture, String> {
-    let broken = |error: image::ImageError| format!("is broken: {error}");
+    let broken = |error: ImageError| match error {
+        ImageError::Limits(_) => {
+            format!("is too large: at most {MAX_SIDE} texels a side are taken, scale it down")
+        }
+        error => format!("is broken: {error}"),
+    };
     let mut limits = Limits::default();
     limits.max_image_width = Some(MAX_SIDE);
     limits.max_image_height = Some(MAX_SIDE);
     limits.max_alloc = Some(MAX_BYTES);
     let mut reader = ImageReader::with_format(Cursor::new(bytes), format(bytes, path)?);
     reader.limits(limits);
-    let decoder = match reader.into_decoder() {
-        Ok(decoder) => decoder,
-        Err(image::ImageError::Limits(_)) => {
-            return Err(format!("is too large: at most {MAX_SIDE} texels a side are taken, scale it down"));
-        }
-        Err(error) => return Err(broken(error)),
-    };
+    let decoder = reader.into_decoder().map_err(broken)?;
     let (width, height) = decoder.dimensions();
     let color = decoder.color_type();
     let sample_bytes = u64::from(color.bytes_per_pixel() / color.channel_count());
@@ -92,14 +90,13 @@ fn decode_image(bytes: &[u8], path: &Path) -> Result<Picture, String> {
 /// What a file is. Names are asked only where the first bytes say nothing: TGA has no mark.
 fn format(bytes: &[u8], path: &Path) -> Result<ImageFormat, String> {
     let by_name = || ImageFormat::from_path(path).ok().filter(|format| *format == ImageFormat::Tga);
-    let format =
-        if bytes.starts_with(DDS_MAGIC) { Some(ImageFormat::Dds) } else { image::guess_format(bytes).ok() };
-    match format.or_else(by_name) {
+    match image::guess_format(bytes).ok().or_else(by_name) {
         _ if bytes.is_empty() => Err("is empty".to_owned()),
         _ if bytes.starts_with(b"version https://git-lfs") => {
             Err("is a Git LFS pointer, not the picture; fetch it with `git lfs pull`".to_owned())
         }
-        Some(format) if format.reading_enabled() => Ok(format),
+        // of DDS the crate says that it is not read, but reads it
+        Some(format) if format.reading_enabled() || format == ImageFormat::Dds => Ok(format),
         _ => Err(
             "is no picture of a known format (png, jpg, bmp, tga, pnm, tif, gif, webp, hdr, qoi, dds, exr)"
                 .to_owned(),

@@ -127,7 +127,7 @@ impl Cover {
         let share = |part: usize| part as f32 / side as f32;
         match side {
             1 => Self { first: 0, count: 1, weights: [1.0, 0.0, 0.0] },
-            _ if side % 2 == 0 => Self { first: 2 * place, count: 2, weights: [0.5, 0.5, 0.0] },
+            _ if side.is_multiple_of(2) => Self { first: 2 * place, count: 2, weights: [0.5, 0.5, 0.0] },
             // from place · (2 + 1/half) on: what is left of the first, the second whole, and a part of the third
             _ => Self {
                 first: 2 * place,
@@ -152,11 +152,11 @@ struct Mean {
 
 impl Mean {
     fn add(&mut self, texel: [f32; 4], weight: f32) {
-        for k in 0..4 {
-            self.plain[k] += texel[k] * weight;
+        for (sum, x) in self.plain.iter_mut().zip(texel) {
+            *sum += x * weight;
         }
-        for k in 0..3 {
-            self.by_alpha[k] += texel[k] * (texel[3] * weight);
+        for (sum, x) in self.by_alpha.iter_mut().zip(texel) {
+            *sum += x * (texel[3] * weight);
         }
     }
 

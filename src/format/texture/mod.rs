@@ -152,6 +152,3 @@ fn with_levels_f32(size: [u32; 2], texels: Vec<[f32; 4]>, is_color: bool) -> (bo
     let varies = texels.par_iter().any(|texel| texel[3] != 1.0);
     (varies, Texels::F32(mip::levels_f32(size, texels, is_color && varies)))
 }
-
-#[cfg(test)]
-mod tests;

@@ -1,7 +1,7 @@
 use super::*;
 
 fn parsed(text: &str) -> JobFile {
-    parse(text, Path::new("jobs")).unwrap_or_else(|(place, e)| panic!("{place}: {e}"))
+    parse(text, Path::new("jobs/a.yaml")).unwrap_or_else(|(place, e)| panic!("{place}: {e}"))
 }
 
 #[test]
@@ -41,7 +41,7 @@ prune: 0
 priority: 0
 materials: {Glass: {Ni: 1.5, illum: 7, Kd: [0.1, 0.2, 0.3]}}
 overrides:
-  - {frames: 10-20, camera: auto, lights: auto}
+  - {frames: 10-20, camera: auto, lights: auto, background: sky.hdr}
   - {files: \"Cornell*\", size: [1920, 1080], format: exr, name: \"{stem}-hd\", samples: 4}
 ",
     );
@@ -53,6 +53,10 @@ overrides:
     assert_eq!((job.options.up, job.options.size), (Some(DVec3::Z), Some([1280, 720])));
     let glass = &job.options.materials[0];
     assert!(glass.words.contains(&("Kd".to_string(), "0.1 0.2 0.3".to_string())), "{glass:?}");
+    assert_eq!(glass.said_in, Path::new("jobs/a.yaml"));
+    assert_eq!(job.options.background, Some(Background::Color(Vec3::ZERO)));
+    let sky = Background::File("jobs/sky.hdr".into());
+    assert_eq!(job.overrides[0].options.background, Some(sky));
     assert_eq!(job.overrides[1].options.format.as_deref(), Some("exr"));
 }
 
@@ -75,6 +79,8 @@ fn errors_have_a_place_what_is_allowed_and_the_nearest_name() {
         ("frames: 1-", ":3:9", &["1-"]),
         ("materials: {a: {Kx: 1}}", ":3:1", &["Kx"]),
         ("ambient: [0, -1, 0]", ":3:", &["ambient", "out of range"]),
+        ("background: [0, -1, 0]", ":3:", &["background", "out of range"]),
+        ("background: {sky: 1}", ":3:", &["background", "a colour", "sky.hdr"]),
         ("sequence: b/", ":3:1", &["duplicate", "sequence"]),
         ("version: 2", "", &["duplicate", "version"]),
     ];
