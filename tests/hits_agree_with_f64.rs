@@ -49,10 +49,10 @@ fn small_pictures_of_scenes() {
 }
 
 #[test]
-#[ignore = "a minute; RENTIX_SCENES=… cargo test --release --test hits_agree_with_f64 -- --ignored"]
+#[ignore = "one to three minutes; RENTIX_SCENES=… cargo test --release --test hits_agree_with_f64 -- --ignored"]
 fn larger_pictures_of_scenes() {
     for (path, eye, look_at) in [BUNNY, SIBENIK, CONFERENCE] {
-        pictures(path, eye, look_at, [160, 90]);
+        pictures(path, eye, look_at, [96, 54]);
     }
 }
 
