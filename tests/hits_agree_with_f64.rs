@@ -44,7 +44,7 @@ const CONFERENCE: (&str, Vec3, Vec3) =
 #[test]
 fn small_pictures_of_scenes() {
     for (path, eye, look_at) in [BUNNY, SIBENIK, CONFERENCE] {
-        pictures(path, eye, look_at, [24, 14]);
+        pictures(path, eye, look_at, [18, 10]);
     }
 }
 
