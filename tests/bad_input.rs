@@ -35,7 +35,7 @@ fn each_file_is_rendered_or_refused_as_the_table_says() {
         in_table.insert(name.to_owned());
     }
     let inputs = fs::read_dir(data()).unwrap().map(|entry| entry.unwrap().file_name().into_string().unwrap());
-    let is_input = |name: &String| name.ends_with(".obj") || name.ends_with(".yaml");
+    let is_input = |name: &String| Path::new(name).extension().is_some_and(|e| e == "obj" || e == "yaml");
     assert_eq!(inputs.filter(is_input).collect::<BTreeSet<_>>(), in_table);
 }
 
@@ -115,6 +115,10 @@ fn a_hundred_megabytes_on_one_line() {
     one_line(100 << 20);
 }
 
+fn lines(count: u32, line: impl Fn(u32) -> String) -> String {
+    (0..count).fold(String::new(), |text, i| text + &line(i))
+}
+
 fn many(count: u32) {
     for of in [
         |i| format!("g {i}\n"),
@@ -124,11 +128,11 @@ fn many(count: u32) {
         |i| format!("mtllib {i}\n"),
     ] as [fn(u32) -> String; 5]
     {
-        rendered_text(&(TRIANGLE.to_owned() + &(0..count).map(of).collect::<String>()));
+        rendered_text(&(TRIANGLE.to_owned() + &lines(count, of)));
     }
     // one material of many is used
     let folder = tempfile::tempdir().unwrap();
-    let mtl: String = (0..count).map(|i| format!("newmtl m{i}\n")).collect();
+    let mtl = lines(count, |i| format!("newmtl m{i}\n"));
     fs::write(folder.path().join("a.mtl"), &mtl).unwrap();
     let path = folder.path().join("a.obj");
     fs::write(&path, format!("mtllib a.mtl\n{TRIANGLE}usemtl m7\nf 1 2 3\n")).unwrap();
@@ -157,9 +161,9 @@ fn pictures_that_are_less_than_they_say() {
     file("a.tga", b"\0\0\x02\0\0\0\0\0\0\0\0\0\0\x40\0\x40\x20\x08\x01");
     file("a.hdr", b"#?RADIANCE\n\n-Y 8000 +X 8000\n\x01");
     let names = ["a.pgm", "a.ppm", "a.qoi", "a.tga", "a.hdr"];
-    let mtl: String = names.iter().map(|name| format!("newmtl {name}\nmap_Kd {name}\n")).collect();
+    let mtl = lines(5, |i| format!("newmtl {0}\nmap_Kd {0}\n", names[i as usize]));
     file("a.mtl", mtl.as_bytes());
-    let faces: String = names.iter().map(|name| format!("usemtl {name}\nf 1 2 3\n")).collect();
+    let faces = lines(5, |i| format!("usemtl {}\nf 1 2 3\n", names[i as usize]));
     file("a.obj", format!("mtllib a.mtl\n{TRIANGLE}{faces}").as_bytes());
     let said = rendered(&folder.path().join("a.obj"), 0);
     for name in names {
@@ -210,7 +214,7 @@ fn a_folder_without_rights_is_named() {
     let folder = store.path().join("locked");
     fs::create_dir(&folder).unwrap();
     fs::write(folder.join("a_1.obj"), TRIANGLE).unwrap();
-    fs::set_permissions(&folder, fs::Permissions::from_mode(0)).unwrap();
+    fs::set_permissions(&folder, fs::Permissions::from_mode(0o000)).unwrap();
     if fs::read_dir(&folder).is_ok() {
         println!("skipped: this user may read everything");
     } else {
