@@ -48,7 +48,7 @@ impl MaterialRecord {
             ke: m.ke.into(),
             ni: if m.ni > 0.0 { m.ni } else { 1.0 },
             tf: m.tf.into(),
-            flags: u32::from(m.halo) * HALO | u32::from(m.tf_given) * TF_GIVEN,
+            flags: (u32::from(m.halo) * HALO) | (u32::from(m.tf_given) * TF_GIVEN),
         }
     }
 }

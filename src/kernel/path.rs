@@ -130,7 +130,7 @@ impl<A: Aggregate> Walk<'_, '_, A> {
             return dissolved(Vec3::ZERO);
         }
         let bounce = self.bounce(path, surface, p);
-        let f0 = matches!(m.illum, 5 | 7).then(|| self.f0(path, surface, p));
+        let f0 = matches!(m.illum, 5 | 7).then(|| Self::f0(path, surface, p));
         let lit = self.lights(path, surface, p, f0);
         let ambient = m.ka * self.scene.shot.ambient + m.ke;
         let ks = m.ks.min(Vec3::ONE);
@@ -179,7 +179,7 @@ impl<A: Aggregate> Walk<'_, '_, A> {
     }
 
     /// F0: Ks; of model 7 with Ks 0 that of the densities.
-    fn f0(&self, path: &Path, surface: &Surface, p: &Point) -> Vec3 {
+    fn f0(path: &Path, surface: &Surface, p: &Point) -> Vec3 {
         let ks = p.material.ks.min(Vec3::ONE);
         if p.material.illum == 7 && ks == Vec3::ZERO {
             let (n1, n2, _) = Self::densities(path, surface, p);
@@ -197,7 +197,7 @@ impl<A: Aggregate> Walk<'_, '_, A> {
         if !matches!(p.material.illum, 5..=7) {
             return Bounce { mirrored, refracted: None, fresnel: Vec3::ZERO, media: path.media };
         }
-        let f0 = self.f0(path, surface, p);
+        let f0 = Self::f0(path, surface, p);
         if p.material.illum == 5 {
             return Bounce { mirrored, refracted: None, fresnel: schlick(f0, p.cos), media: path.media };
         }

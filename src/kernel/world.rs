@@ -64,8 +64,9 @@ impl<'a> World<'a> {
             objects.push(WorldObject { geometry, first_material, first_part, transform });
             first_part += geometry.meshes.len() as u32;
         }
-        let has_map_d = |t: &Option<&Textures>| t.is_some_and(|t| t.map_d.is_some());
-        let is_opaque = materials.iter().all(MaterialRecord::is_opaque) && !textures.iter().any(has_map_d);
+        let has_map_d = |t: Option<&Textures>| t.is_some_and(|t| t.map_d.is_some());
+        let is_opaque =
+            materials.iter().all(MaterialRecord::is_opaque) && !textures.iter().copied().any(has_map_d);
         let is_direct =
             materials.iter().all(MaterialRecord::is_direct) && textures.iter().all(Option::is_none);
         Self { objects, materials, textures, is_opaque, is_direct }

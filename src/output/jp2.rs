@@ -1,4 +1,4 @@
-//! JPEG 2000, lossless, by the openjp2 crate (a port of OpenJPEG). The only unsafe code of this room is what its
+//! JPEG 2000, lossless, by the openjp2 crate (a port of `OpenJPEG`). The only unsafe code of this room is what its
 //! output stream asks for: callbacks with a pointer to our buffer.
 
 use super::encoding::{Bits, Encoding};
@@ -12,6 +12,7 @@ use openjp2::{Codec, Stream, opj_cparameters_t, opj_image, opj_image_comptparm};
 use std::ffi::c_void;
 
 /// RGB, 8 or 16 bits, no alpha.
+#[allow(clippy::field_reassign_with_default, reason = "the parameters have a destructor")]
 pub(super) fn encode(film: &Film, encoding: Encoding) -> Result<Vec<u8>, String> {
     let [width, height] = film.size;
     let stops = encoding.exposure_stops;

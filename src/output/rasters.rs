@@ -28,7 +28,9 @@ pub(super) fn encode_bmp(film: &Film, encoding: Encoding) -> Result<Vec<u8>, Str
 /// TGA.
 pub(super) fn encode_tga(film: &Film, encoding: Encoding) -> Result<Vec<u8>, String> {
     let (rows, color) = eight_bits(film, encoding);
-    written(|out| tga::TgaEncoder::new(out).disable_rle().write_image(&rows, film.size[0], film.size[1], color))
+    written(|out| {
+        tga::TgaEncoder::new(out).disable_rle().write_image(&rows, film.size[0], film.size[1], color)
+    })
 }
 
 /// WebP, lossless.
