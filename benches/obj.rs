@@ -4,7 +4,7 @@
 //! turn, one thread, the files in the page cache.
 
 use rentix::clock::Stopwatch;
-use rentix::format::{ReadOptions, load_obj, scan_bounds};
+use rentix::format::{ReadOptions, TextureCache, load_obj, scan_bounds};
 use std::hint::black_box;
 use std::path::{Path, PathBuf};
 
@@ -39,7 +39,7 @@ fn main() {
 }
 
 fn measure(file: &Path) {
-    let options = ReadOptions::default();
+    let (options, textures) = (ReadOptions::default(), TextureCache::default());
     let triangles = tobj::LoadOptions { triangulate: true, ..Default::default() };
     let mut ms = [const { Vec::new() }; 3];
     for _ in 0..RUNS {
@@ -49,7 +49,7 @@ fn measure(file: &Path) {
             watch.ms()
         };
         ms[0].push(timed(&|| drop(black_box(tobj::load_obj(file, &triangles)))));
-        ms[1].push(timed(&|| drop(black_box(load_obj(file, &options)))));
+        ms[1].push(timed(&|| drop(black_box(load_obj(file, &options, &textures)))));
         ms[2].push(timed(&|| drop(black_box(scan_bounds(file)))));
     }
     let [tobj, load, bounds] = ms.map(|mut runs: Vec<f64>| {

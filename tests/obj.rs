@@ -2,12 +2,16 @@
 //!
 //! `RENTIX_SCENES` names the folder with the scenes; without it nothing is tested here, and that is said.
 
-use rentix::format::{ReadOptions, load_obj, scan_bounds};
+use rentix::format::{FormatError, Loaded, ReadOptions, TextureCache, scan_bounds};
 use rentix::math::{Bounds, DVec3};
 use rentix::scene::{ABSENT, Geometry};
 use std::collections::HashMap;
 use std::panic::catch_unwind;
 use std::path::{Path, PathBuf};
+
+fn load_obj(path: &Path, options: &ReadOptions) -> Result<Loaded, FormatError> {
+    rentix::format::load_obj(path, options, &TextureCache::default())
+}
 
 /// All OBJ files below a folder of the scenes, in order.
 fn objs(below: &str) -> Vec<PathBuf> {

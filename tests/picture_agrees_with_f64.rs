@@ -6,11 +6,12 @@ use rentix::device::{Device, Stop};
 use rentix::math::{DVec3, Vec3};
 use rentix::plan::plan_frame;
 use rentix::scene::{
-    ABSENT, AovSet, Attribute, Camera, Corners, Faces, Falloff, Filter, Frame, Geometry, Light, Material,
-    MaterialRuns, Mesh, Normals, Object, Part, Positions, Shot, Triangles,
+    ABSENT, AovSet, Attribute, Background, Camera, Corners, Faces, Falloff, Filter, Frame, Geometry, Light,
+    Material, MaterialRuns, Mesh, Normals, Object, Part, Positions, Shot, Triangles,
 };
 use std::sync::Arc;
 
+const BACKGROUND: Vec3 = Vec3::new(0.1, 0.2, 0.4);
 const TRIANGLES: u32 = 24;
 const SIZE: [u32; 2] = [96, 54];
 
@@ -162,6 +163,7 @@ fn arriving(light: &Light, p: DVec3) -> (DVec3, f64, DVec3) {
             let share = smoothstep(outer, inner, -(to / d).dot(direction.as_dvec3().normalize()));
             (to / d, d, color.as_dvec3() * f64::from(intensity) * weaken(falloff, d) * share)
         }
+        Light::Area { .. } => unreachable!("no light of this test"),
     }
 }
 
@@ -234,7 +236,7 @@ fn pixel(patches: &[Patch], shot: &Shot, x: u32, y: u32) -> (DVec3, f64) {
             break;
         }
     }
-    (sum + through * shot.background.as_dvec3(), margin.0)
+    (sum + through * BACKGROUND.as_dvec3(), margin.0)
 }
 
 fn shot() -> Shot {
@@ -271,7 +273,7 @@ fn shot() -> Shot {
             },
         ],
         ambient: Vec3::new(0.3, 0.2, 0.1),
-        background: Vec3::new(0.1, 0.2, 0.4),
+        background: Background::Color(BACKGROUND),
         size: SIZE,
         samples: 1,
         filter: Filter::Box,

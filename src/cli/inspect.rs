@@ -4,7 +4,7 @@ use super::render_args::RenderArgs;
 use super::{EXIT_FAILED, Global, request};
 use crate::diff::{Change, changes};
 use crate::job::{self, Job, Picture};
-use crate::run::read_frame;
+use crate::run::{Sources, read_frame};
 use crate::scene::Frame;
 use crate::warning::Warnings;
 use anyhow::Result;
@@ -28,8 +28,9 @@ pub(super) fn inspect(args: &RenderArgs, global: &Global) -> Result<ExitCode> {
     }
     let mut failed = 0;
     let mut before: Option<(usize, Frame)> = None;
+    let sources = Sources::default();
     for picture in &job.pictures {
-        match read_frame(&job, picture, args.lenient, &mut warnings) {
+        match read_frame(&job, picture, &sources, args.lenient, &mut warnings) {
             Err(error) => {
                 failed += 1;
                 eprintln!("error: {error}");

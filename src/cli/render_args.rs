@@ -19,7 +19,7 @@ pub(super) struct RenderArgs {
     /// Width and height: 640x360, hd (1280x720) or fullhd (1920x1080) [default: hd]
     #[arg(long, value_parser = size::pixels, value_name = "SIZE", help_heading = "Output")]
     pub size: Option<[u32; 2]>,
-    /// Picture format: png, exr, ppm [default: png]
+    /// Picture format: png exr ppm pgm pbm jpg bmp tif jp2 ras tga webp qoi hdr … [default: png]
     #[arg(long, value_name = "EXT", help_heading = "Output")]
     pub format: Option<String>,
     /// Name of a picture: {stem}, {name}, {frame}, {frame:04} [default: {stem}; layers: {name}_{frame:04}]
@@ -84,8 +84,8 @@ pub(super) struct RenderArgs {
     /// Ambient light, R,G,B or one number [default: 0.1]
     #[arg(long, value_name = "R,G,B", help_heading = "Scene")]
     pub ambient: Option<String>,
-    /// Background colour, R,G,B or one number [default: 0]
-    #[arg(long, value_name = "R,G,B", help_heading = "Scene")]
+    /// Background, R,G,B or one number, or a picture by latitude and longitude [default: 0]
+    #[arg(long, value_name = "R,G,B|FILE", help_heading = "Scene")]
     pub background: Option<String>,
     /// Smooth normals over edges below this angle where the file has none, degrees
     #[arg(long, value_name = "DEG", help_heading = "Scene")]

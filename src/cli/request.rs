@@ -45,7 +45,7 @@ fn options(args: &RenderArgs) -> Result<Options> {
         fov: ranged("--fov", args.fov, &limits::FOV)?,
         lights: (!lights.is_empty()).then_some(LightChoice::Given(lights)),
         ambient: read("--ambient", args.ambient.as_deref(), settings::color)?,
-        background: read("--background", args.background.as_deref(), settings::color)?,
+        background: read("--background", args.background.as_deref(), settings::background)?,
         samples: ranged("--samples", args.samples, &limits::SAMPLES)?,
         filter: read("--filter", args.filter.as_deref(), |w| one_of(&settings::FILTERS, w))?,
         depth: ranged("--depth", args.depth, &limits::DEPTH)?,

@@ -4,7 +4,7 @@
 use super::{Device, DeviceError, DeviceInfo, DeviceKind, RayCounts, Stop, Traced, UpdateCost};
 use crate::film::Film;
 use crate::plan::{Residency, Step, UpdatePlan, tree_name};
-use crate::scene::{Frame, Object, PartHash, Shot};
+use crate::scene::{Background, Frame, Object, PartHash, Shot};
 use std::collections::BTreeMap;
 
 /// Bytes that a tree of the fake device takes for each triangle.
@@ -70,7 +70,10 @@ impl FakeDevice {
 /// of the frame's hash.
 pub fn color_of(frame: &Frame, shot: &Shot) -> [f32; 3] {
     if frame.triangles() == 0 {
-        return shot.background.into();
+        return match shot.background {
+            Background::Color(color) => color.into(),
+            Background::Picture(_) => [0.5; 3],
+        };
     }
     let bits = frame.hash().0;
     [0, 8, 16].map(|shift| f32::from((bits >> shift) as u8) / 255.0)

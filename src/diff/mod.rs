@@ -2,7 +2,10 @@
 //!
 //! Meshes are matched by their place (object, run of faces); names that files give never count.
 
-use crate::scene::{Attribute, Frame, Geometry, Material, Mesh, Normals, Object, Part, Texcoords};
+use crate::scene::{
+    Attribute, Frame, Geometry, Map, Material, Mesh, Normals, Object, Part, PartHash, Texcoords, Textures,
+};
+use std::collections::BTreeSet;
 
 /// Counts of what changed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
@@ -21,7 +24,7 @@ pub struct Change {
     pub removed: u32,
     /// Materials that differ, came or went, and objects whose triangles are assigned otherwise.
     pub materials: u32,
-    /// Texture files that differ, came or went.
+    /// Textures that differ, came or went, each counted once however many materials use it.
     pub textures: u32,
 }
 
@@ -29,7 +32,7 @@ pub struct Change {
 pub fn changes(before: Option<&Frame>, after: &Frame) -> Change {
     let none = Frame::default();
     let before = before.unwrap_or(&none);
-    let mut change = Change::default();
+    let mut change = Change { textures: texture_changes(before, after), ..Change::default() };
     for i in 0..before.objects.len().max(after.objects.len()) {
         match (before.objects.get(i), after.objects.get(i)) {
             (Some(a), Some(b)) => object_changes(a, b, &mut change),
@@ -147,21 +150,33 @@ fn material_changes(a: &[Part<Material>], b: &[Part<Material>], change: &mut Cha
     for i in 0..a.len().max(b.len()) {
         match (a.get(i), b.get(i)) {
             (Some(a), Some(b)) => {
-                let (maps_a, maps_b): (Vec<_>, Vec<_>) =
-                    (a.maps.iter().map(|m| m.content).collect(), b.maps.iter().map(|m| m.content).collect());
-                let textures =
-                    (0..maps_a.len().max(maps_b.len())).filter(|&k| maps_a.get(k) != maps_b.get(k)).count();
-                change.textures += textures as u32;
-                let without_maps = |m: &Material| Material { maps: Vec::new(), ..m.clone() };
-                change.materials += u32::from(a != b && without_maps(a) != without_maps(b));
+                // what differs in textures alone is counted there, unless they only changed places
+                let counted = change.textures > 0 && same_but_for_textures(a, b);
+                change.materials += u32::from(a != b && !counted);
             }
-            (Some(m), None) | (None, Some(m)) => {
-                change.materials += 1;
-                change.textures += m.maps.len() as u32;
-            }
+            (Some(_), None) | (None, Some(_)) => change.materials += 1,
             (None, None) => {}
         }
     }
+}
+
+/// Whether constants and the ways in which maps are used are the same.
+fn same_but_for_textures(a: &Material, b: &Material) -> bool {
+    let constants = |m: &Material| Material { textures: Textures::default(), ..m.clone() };
+    let same_use = |(a, b): (Option<&Map>, Option<&Map>)| match (a, b) {
+        (Some(a), Some(b)) => Map { texture: a.texture.clone(), ..b.clone() } == *a,
+        _ => true,
+    };
+    constants(a) == constants(b) && a.textures.slots().into_iter().zip(b.textures.slots()).all(same_use)
+}
+
+/// How many textures only one of the frames has; one that came for one that went counts once.
+fn texture_changes(before: &Frame, after: &Frame) -> u32 {
+    let of = |frame: &Frame| -> BTreeSet<PartHash> {
+        frame.objects.iter().flat_map(|o| o.geometry.textures()).map(Part::hash).collect()
+    };
+    let (before, after) = (of(before), of(after));
+    before.difference(&after).count().max(after.difference(&before).count()) as u32
 }
 
 #[cfg(test)]

@@ -43,6 +43,14 @@ pub enum FormatError {
         /// The file.
         path: PathBuf,
     },
+    /// A picture that is broken, too large or of no known format.
+    #[error("{}: {cause}", path.display())]
+    BadPicture {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong with it and what to do.
+        cause: String,
+    },
     /// A face that cannot be what its author meant.
     #[error("{}:{line}: {cause}; the frame is not rendered (--lenient drops the face)", path.display())]
     BadFace {

@@ -1,12 +1,14 @@
-//! Bytes to values with diagnostics: OBJ and MTL. The only room that reads scenes.
+//! Bytes to values with diagnostics: OBJ, MTL and textures. The only room that reads scenes.
 
 mod error;
+mod library;
 mod lookup;
 mod material;
 mod mtl;
 mod number;
 mod obj;
 mod text;
+mod texture;
 
 use crate::clock::Stopwatch;
 use crate::math::Bounds;
@@ -16,10 +18,11 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 pub use error::FormatError;
-pub use material::Library;
+pub use library::Library;
 pub use mtl::is_mtl_word;
 pub use obj::{ParsedObj, parse_obj};
 use text::Text;
+pub use texture::{TextureCache, load_picture};
 
 /// How files are read.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -33,7 +36,7 @@ pub struct ReadOptions {
     pub mtl_srgb: bool,
     /// An MTL whose materials replace those of the same name.
     pub materials_file: Option<PathBuf>,
-    /// Statements that replace those of the materials named; applied last.
+    /// Statements of the job that replace those of the materials named; applied last.
     pub material_overrides: Vec<MaterialOverride>,
 }
 
@@ -44,6 +47,8 @@ pub struct MaterialOverride {
     pub name: Vec<u8>,
     /// Words of an MTL and what stands behind them.
     pub words: Vec<(String, String)>,
+    /// The job file that says so; the files of maps are relative to it.
+    pub said_in: PathBuf,
 }
 
 /// An OBJ with all that it refers to.
@@ -51,11 +56,11 @@ pub struct MaterialOverride {
 pub struct Loaded {
     /// Shape and materials.
     pub geometry: Arc<Geometry>,
-    /// Every file that was read: OBJ, MTL, maps.
+    /// Every file whose content it is made of: OBJ, MTL, textures.
     pub inputs: Vec<PathBuf>,
     /// For each slot of [`Geometry::materials`] the first name under which it was used.
     pub material_names: Vec<Vec<u8>>,
-    /// Bytes of all inputs.
+    /// Bytes that were read; a texture that was in the cache costs none.
     pub bytes_read: u64,
     /// Time to read the OBJ, milliseconds.
     pub read_ms: f64,
@@ -63,12 +68,13 @@ pub struct Loaded {
     pub parse_ms: f64,
     /// What is wrong but does not stop the frame.
     pub warnings: Warnings,
-    /// Libraries and maps that were named and not found, each as a sentence.
+    /// Libraries and textures that were named and cannot be had, each as a sentence.
     pub missing: Vec<String>,
 }
 
-/// Reads an OBJ and all that it refers to.
-pub fn load_obj(path: &Path, options: &ReadOptions) -> Result<Loaded, FormatError> {
+/// Reads an OBJ and all that it refers to; textures through a cache. Must not be called from a thread of rayon's pool
+/// (see [`TextureCache`]).
+pub fn load_obj(path: &Path, options: &ReadOptions, textures: &TextureCache) -> Result<Loaded, FormatError> {
     let watch = Stopwatch::start();
     let bytes = text::read(path)?;
     let read_ms = watch.ms();
@@ -76,8 +82,8 @@ pub fn load_obj(path: &Path, options: &ReadOptions) -> Result<Loaded, FormatErro
     let text = Text::new(&bytes, path)?;
     let mut warnings = Warnings::default();
     let lines = obj::Lines::new(&text, path, options.lenient, &mut warnings)?;
-    let mut loader = material::Loader::new(path, options);
-    let library = loader.library(lines.libraries(), lines.used_materials(), &mut warnings)?;
+    let mut loader = library::Loader::new(path, options);
+    let library = loader.library(lines.libraries(), lines.used_materials(), textures, &mut warnings)?;
     let parsed = lines.into_parsed(&library, options, &mut warnings);
     let inputs = std::iter::once(path.to_path_buf()).chain(loader.inputs).collect();
     Ok(Loaded {
@@ -99,12 +105,10 @@ pub fn scan_bounds(path: &Path) -> Result<Bounds, FormatError> {
     Ok(bounds)
 }
 
-/// The libraries that an OBJ names and the maps of all their materials, as far as they are there. The shape is not
+/// The libraries that an OBJ names and the maps of all materials, as far as they are there. The shape is not
 /// read, and what cannot be read names nothing: this is for what must not be written over.
-pub fn named_files(path: &Path, materials_file: Option<&Path>) -> Vec<PathBuf> {
+pub fn named_files(path: &Path, options: &ReadOptions) -> Vec<PathBuf> {
     let Ok(bytes) = text::read(path) else { return Vec::new() };
     let Ok(text) = Text::new(&bytes, path) else { return Vec::new() };
-    let options =
-        ReadOptions { materials_file: materials_file.map(Path::to_path_buf), ..ReadOptions::default() };
-    material::Loader::new(path, &options).named_files(&obj::library_statements(&text))
+    library::Loader::new(path, options).named_files(&obj::library_statements(&text))
 }

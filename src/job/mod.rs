@@ -16,7 +16,7 @@ pub mod words;
 pub use discover::FrameFile;
 pub use file::Outside;
 pub use numbers::{Chunk, FrameSet, Order};
-pub use options::{CameraChoice, LightChoice, Options};
+pub use options::{Background, CameraChoice, LightChoice, Options};
 pub use resolve::resolve;
 pub use settings::Settings;
 

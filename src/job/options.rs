@@ -4,6 +4,7 @@ use super::track::CameraTrack;
 use crate::format::MaterialOverride;
 use crate::math::{DVec3, Vec3};
 use crate::scene::{AovSet, Filter, Light};
+use std::path::PathBuf;
 
 /// Where the camera comes from.
 #[derive(Clone, Debug, PartialEq)]
@@ -21,6 +22,15 @@ pub enum LightChoice {
     Auto,
     /// As given.
     Given(Vec<Light>),
+}
+
+/// What is seen where nothing is hit.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Background {
+    /// The same everywhere, linear RGB.
+    Color(Vec3),
+    /// A picture by latitude and longitude.
+    File(PathBuf),
 }
 
 macro_rules! options {
@@ -79,8 +89,8 @@ options! {
     lights: LightChoice,
     /// Ambient light.
     ambient: Vec3,
-    /// Background colour.
-    background: Vec3,
+    /// Background.
+    background: Background,
     /// Samples a pixel.
     samples: u32,
     /// Pixel filter.

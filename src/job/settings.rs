@@ -1,14 +1,22 @@
 //! The settings of one picture: every option with its default filled in.
 
-use super::options::{CameraChoice, LightChoice, Options, limits};
+use super::options::{Background, CameraChoice, LightChoice, Options, limits};
 use super::track::{CameraPose, CameraTrack, Interpolation, Key};
 use super::words::{listed, nearest, one_of};
 use crate::format::ReadOptions;
 use crate::math::{DVec3, Vec3};
-use crate::scene::{Aov, AovSet, Camera, Falloff, Filter, Light, Shot};
+use crate::scene::{self, Aov, AovSet, Camera, Falloff, Filter, Light, Shot};
 
 /// Picture formats of this version, by their words.
-pub const FORMATS: [&str; 3] = ["png", "exr", "ppm"];
+pub const FORMATS: [&str; 19] = [
+    "png", "exr", "ppm", "pgm", "pbm", "jpg", "jpeg", "jpe", "bmp", "dib", "tif", "tiff", "jp2", "sr", "ras",
+    "tga", "webp", "qoi", "hdr",
+];
+
+/// Those that hold 16 bits a channel.
+const SIXTEEN_BITS: [&str; 6] = ["png", "tif", "tiff", "ppm", "pgm", "jp2"];
+/// Those that hold floats, whatever the bits.
+const FLOATS: [&str; 2] = ["exr", "hdr"];
 
 /// Pixel filters by their words.
 pub const FILTERS: [(&str, Filter); 3] =
@@ -38,8 +46,8 @@ pub struct Settings {
     pub fov_deg: f64,
     /// Ambient light.
     pub ambient: Vec3,
-    /// Background colour.
-    pub background: Vec3,
+    /// What is seen where nothing is hit.
+    pub background: Background,
     /// Width and height, pixels.
     pub size: [u32; 2],
     /// Samples a pixel.
@@ -74,6 +82,10 @@ impl Settings {
     /// Fills in what the options leave open.
     pub fn new(options: &Options) -> Result<Self, String> {
         let o = options.clone();
+        let format = o.format.clone().unwrap_or_else(|| FORMATS[0].to_string());
+        if o.bits == Some(16) && !SIXTEEN_BITS.contains(&&*format) && !FLOATS.contains(&&*format) {
+            return Err(format!("{format} has 8 bits a channel; 16 have {}", SIXTEEN_BITS.join(", ")));
+        }
         let read = ReadOptions {
             smooth_angle_deg: o.smooth_angle,
             mtl_srgb: o.mtl_srgb.unwrap_or(false),
@@ -86,7 +98,7 @@ impl Settings {
             up: o.up.unwrap_or(DVec3::Y),
             fov_deg: o.fov.unwrap_or(40.0),
             ambient: o.ambient.unwrap_or(Vec3::splat(0.1)),
-            background: o.background.unwrap_or(Vec3::ZERO),
+            background: o.background.unwrap_or(Background::Color(Vec3::ZERO)),
             size: o.size.unwrap_or([1280, 720]),
             samples: o.samples.unwrap_or(1),
             filter: o.filter.unwrap_or_default(),
@@ -95,7 +107,7 @@ impl Settings {
             prune: o.prune.unwrap_or(1.0 / 4096.0),
             alpha: o.alpha.unwrap_or(false),
             aovs: o.aov.unwrap_or_default(),
-            format: o.format.unwrap_or_else(|| FORMATS[0].to_string()),
+            format,
             bits: o.bits.unwrap_or(8),
             quality: o.quality.unwrap_or(92),
             exposure_stops: o.exposure.unwrap_or(0.0),
@@ -104,13 +116,13 @@ impl Settings {
         })
     }
 
-    /// The shot of a frame with the camera and lights that were found for it.
-    pub fn shot(&self, camera: Camera, lights: Vec<Light>) -> Shot {
+    /// The shot of a frame with the camera, lights and background that were found for it.
+    pub fn shot(&self, camera: Camera, lights: Vec<Light>, background: scene::Background) -> Shot {
         Shot {
             camera,
             lights,
             ambient: self.ambient,
-            background: self.background,
+            background,
             size: self.size,
             samples: self.samples,
             filter: self.filter,
@@ -234,6 +246,18 @@ pub fn color(text: &str) -> Result<Vec3, String> {
     Ok(v.as_vec3())
 }
 
+/// A background as typed: a colour, or else a picture's file.
+pub fn background(text: &str) -> Result<Background, String> {
+    let is_number = |word: &str| word.trim().parse::<f64>().is_ok();
+    if text.split(',').any(is_number) {
+        color(text).map(Background::Color)
+    } else if text.is_empty() {
+        Err("a background is a colour, as 0.1,0.2,0.3, or a picture's file".to_string())
+    } else {
+        Ok(Background::File(text.into()))
+    }
+}
+
 /// A light as typed: `point:x,y,z[,intensity]`.
 pub fn light(text: &str) -> Result<Light, String> {
     let wrong =
@@ -260,7 +284,7 @@ mod tests {
     fn defaults_are_those_of_the_contract() {
         let s = Settings::new(&Options::default()).unwrap();
         assert_eq!((s.size, s.samples, s.depth, s.fov_deg), ([1280, 720], 1, 10, 40.0));
-        assert_eq!((s.ambient, s.background), (Vec3::splat(0.1), Vec3::ZERO));
+        assert_eq!((s.ambient, s.background), (Vec3::splat(0.1), Background::Color(Vec3::ZERO)));
         assert_eq!(
             (s.prune, s.format.as_str(), s.camera, s.lights),
             (1.0 / 4096.0, "png", CameraChoice::Auto, LightChoice::Auto)
@@ -286,9 +310,17 @@ mod tests {
         assert!(vector("1,2").is_err() && vector("1,2,nan").is_err() && vector("a,b,c").is_err());
         assert_eq!(color("0.5"), Ok(Vec3::splat(0.5)));
         assert!(color("-1,0,0").is_err());
+        assert_eq!(background("0.5"), Ok(Background::Color(Vec3::splat(0.5))));
+        assert_eq!(background("sky.hdr"), Ok(Background::File("sky.hdr".into())));
+        assert!(background("1,2").is_err() && background("-1").is_err() && background("").is_err());
         assert!(matches!(light("point:0,5,2,0.5"), Ok(Light::Point { intensity: 0.5, .. })));
         assert!(light("spot:1,2,3").is_err() && light("point:1,2").is_err());
         assert!(up("0,0,0").is_err() && up("z") == Ok(DVec3::Z));
         assert!(format_word("PNG") == Ok("png".to_string()) && format_word("gif").is_err());
+        let sixteen = |format: &str| {
+            Settings::new(&Options { format: Some(format.to_string()), bits: Some(16), ..Options::default() })
+                .is_ok()
+        };
+        assert!(sixteen("jp2") && sixteen("exr") && !sixteen("bmp"));
     }
 }

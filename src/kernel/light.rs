@@ -34,8 +34,8 @@ pub struct LightRecord {
 }
 
 impl LightRecord {
-    /// From a light as the job gives it.
-    pub fn new(light: &Light) -> Self {
+    /// From a light as the job gives it; None of one that has no place or direction.
+    pub fn new(light: &Light) -> Option<Self> {
         let unit = |v: Vec3| v.as_dvec3().normalize_or(DVec3::ZERO).as_vec3();
         let cos = |degrees: f32| libm::cos(f64::from(degrees).to_radians()) as f32;
         let weakens = |falloff: Falloff| u32::from(falloff == Falloff::InverseSquare);
@@ -61,8 +61,9 @@ impl LightRecord {
                 record.cos_inner = cos(inner_deg);
                 record.cos_outer = cos(outer_deg);
             }
+            Light::Area { .. } => return None,
         }
-        record
+        Some(record)
     }
 
     /// From a shadow ray's origin to the light: the ray's direction, and the distance at which it ends, in units of
@@ -117,6 +118,7 @@ mod tests {
     fn point(falloff: Falloff) -> LightRecord {
         let color = Vec3::new(1.0, 0.5, 0.25);
         LightRecord::new(&Light::Point { position: Vec3::new(0.0, 4.0, 0.0), color, intensity: 2.0, falloff })
+            .unwrap()
     }
 
     #[test]
@@ -134,7 +136,8 @@ mod tests {
         let light = point(Falloff::None);
         assert_eq!(light.shadow_segment(Vec3::X), (Vec3::new(-1.0, 4.0, 0.0), 1.0));
         let direction = Vec3::new(0.0, -3.0, 0.0);
-        let sun = LightRecord::new(&Light::Directional { direction, color: Vec3::ONE, intensity: 0.5 });
+        let sun =
+            LightRecord::new(&Light::Directional { direction, color: Vec3::ONE, intensity: 0.5 }).unwrap();
         assert_eq!(sun.shadow_segment(Vec3::X), (Vec3::Y, f32::INFINITY));
         assert_eq!(incident(&sun, Vec3::X), Incident { direction: Vec3::Y, radiance: Vec3::splat(0.5) });
     }
@@ -151,6 +154,7 @@ mod tests {
                 intensity: 1.0,
                 falloff: Falloff::None,
             })
+            .unwrap()
         };
         // a point on the floor at angle a from the axis lies at tan a
         let share = |light, degrees: f32| incident(&light, Vec3::X * degrees.to_radians().tan()).radiance.x;

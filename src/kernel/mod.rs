@@ -3,15 +3,20 @@
 //! Plain functions over records of four-float rows, one file for each part of the shading; the same operations in
 //! the same order whatever the tile or the thread, so that a pixel is a function of frame and shot alone.
 
+pub mod area;
 pub mod band;
 pub mod camera;
 pub mod center;
 pub mod direct;
 pub mod light;
 pub mod material;
+pub mod media;
+pub mod path;
+pub mod point;
 pub mod power;
 pub mod sampler;
 pub mod shade;
+pub mod texture;
 pub mod tile;
 pub mod world;
 
@@ -19,7 +24,6 @@ pub mod world;
 mod tests;
 
 pub use band::{FilmBand, bands};
-pub use material::fallback;
 pub use tile::{Scene, TileBuffers, trace_tile};
 
 /// Surfaces that a ray crosses at most, straight on; beyond them it sees nothing.

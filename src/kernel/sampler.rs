@@ -25,6 +25,12 @@ pub fn unit_square(index: u32, pixel: [u32; 2], seed: u32) -> [f32; 2] {
     [unit(owen_scramble(x, hash(pixel_seed))), unit(owen_scramble(y, hash(pixel_seed ^ 1)))]
 }
 
+/// Point `index` of one of a pixel's further sequences; dimension 0 is that of [`unit_square`].
+pub fn unit_square_of(index: u32, pixel: [u32; 2], seed: u32, dimension: u32) -> [f32; 2] {
+    // another seed for each dimension, so that what is paired is not correlated
+    unit_square(index, pixel, hash(seed ^ hash(dimension)))
+}
+
 /// Warps [0, 1)² by the filter's inverse cumulative distribution, separately in x and y.
 pub fn warp(filter: Filter, uv: [f32; 2]) -> [f32; 2] {
     match filter {

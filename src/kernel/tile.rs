@@ -1,18 +1,20 @@
 //! A tile of the picture: camera rays, the surfaces they meet, light, and on through what is transparent; many rays
 //! at a time, so that neighbours share what they touch. What a pixel becomes depends on no other pixel.
 
+use super::area::{AreaLight, AreaSample};
 use super::band::FilmBand;
 use super::camera::{CameraConstants, camera_ray};
 use super::center::fill_center;
 use super::direct::{Shading, ShadowRays, add_lights};
 use super::light::LightRecord;
+use super::path::Walk;
 use super::sampler::place_in_pixel;
 use super::shade::{Reflected, color};
 use super::world::World;
 use super::{RayCounts, SURFACES_MAX};
 use crate::accel::{Aggregate, Hit, Ray};
 use crate::math::Vec3;
-use crate::scene::{Frame, Shot};
+use crate::scene::{Background, Frame, Light, Shot};
 use std::ops::Range;
 
 /// Everything that a frame's tiles have in common.
@@ -26,6 +28,8 @@ pub struct Scene<'a, A> {
     pub camera: CameraConstants,
     /// The lights in the order given.
     pub lights: Vec<LightRecord>,
+    /// The triangles that glow, where the job lets them light the scene.
+    pub area: Option<AreaLight>,
     /// The rest.
     pub shot: &'a Shot,
 }
@@ -33,13 +37,24 @@ pub struct Scene<'a, A> {
 impl<'a, A: Aggregate> Scene<'a, A> {
     /// Takes a frame, what its rays are traced against, and a shot.
     pub fn new(aggregate: &'a A, frame: &'a Frame, shot: &'a Shot) -> Self {
+        let world = World::new(frame);
+        let samples = shot
+            .lights
+            .iter()
+            .find_map(|l| if let Light::Area { samples } = l { Some(*samples) } else { None });
         Self {
             aggregate,
-            world: World::new(frame),
+            area: samples.and_then(|samples| AreaLight::new(&world, samples)),
+            world,
             camera: CameraConstants::new(&shot.camera, shot.size),
-            lights: shot.lights.iter().map(LightRecord::new).collect(),
+            lights: shot.lights.iter().filter_map(LightRecord::new).collect(),
             shot,
         }
+    }
+
+    /// Whether surfaces need nothing but lights at points and what is straight on behind them.
+    fn is_direct(&self) -> bool {
+        self.world.is_direct && self.area.is_none() && matches!(self.shot.background, Background::Color(_))
     }
 }
 
@@ -98,7 +113,11 @@ pub fn trace_tile<A: Aggregate>(
             place_in_pixel(scene.shot.filter, sample, samples, pixel, scene.shot.seed)
         });
         buffers.trace(scene, &mut counts);
-        buffers.follow(scene, &mut counts);
+        if scene.is_direct() {
+            buffers.follow(scene, &mut counts);
+        } else {
+            buffers.walk(scene, band, sample, &mut counts);
+        }
     }
     if band.wants_center() {
         if samples > 1 {
@@ -145,6 +164,19 @@ impl TileBuffers {
         self.hits.resize(self.rays.len(), None);
         scene.aggregate.closest_batch(&self.rays, &mut self.hits);
         counts.camera += self.rays.len() as u64;
+    }
+
+    /// Adds what the camera rays see, one after the other with all that follows from each.
+    fn walk<A: Aggregate>(&mut self, scene: &Scene<A>, band: &FilmBand, index: u32, counts: &mut RayCounts) {
+        for (i, &[x, row]) in self.pixels.iter().enumerate() {
+            let sample =
+                AreaSample { pixel: [x, band.first_row + row], index, seed: scene.shot.seed, surface: 0 };
+            let seen = Walk { scene, sample, counts }.camera(self.rays[i], self.hits[i]);
+            let sum = &mut self.sums[i];
+            sum.rgb += seen.rgb;
+            sum.through += seen.through;
+            sum.albedo += seen.albedo;
+        }
     }
 
     /// Adds what the camera rays see, surface after surface.
@@ -243,8 +275,10 @@ impl PixelSum {
     /// A path that counts for `weight` leaves the scene. With alpha the background adds no colour.
     fn escape(&mut self, shot: &Shot, weight: f32) {
         self.through += weight;
-        if !shot.alpha {
-            self.rgb += shot.background * weight;
+        if let Background::Color(color) = shot.background
+            && !shot.alpha
+        {
+            self.rgb += color * weight;
         }
     }
 }

@@ -3,9 +3,9 @@
 
 use super::material::MaterialRecord;
 use super::power::powf;
-use crate::accel::{Aabb, Hit, Placement, Ray, hit_point, magnitude};
-use crate::math::{DAffine3, DMat3, Mat3, Vec3};
-use crate::scene::{ABSENT, Frame, Geometry, Material, Object};
+use crate::accel::{Aabb, Hit, Placement, Ray, extent, hit_point, magnitude};
+use crate::math::{DAffine3, DMat3, Mat3, Vec2, Vec3};
+use crate::scene::{ABSENT, Frame, Geometry, Material, Object, Part, Reflection, Textures};
 
 /// What a ray meets at a hit.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -22,6 +22,8 @@ pub struct Surface {
     pub kd: Vec3,
     /// The material's place in [`World::materials`].
     pub material: u32,
+    /// Whether the ray meets the side that the corners go round counter-clockwise.
+    pub is_front: bool,
 }
 
 /// What all surfaces of a frame are looked up in. Borrows the frame; copies none of its parts.
@@ -30,8 +32,12 @@ pub struct World<'a> {
     objects: Vec<WorldObject<'a>>,
     /// The material of faces that have none stands first.
     pub materials: Vec<MaterialRecord>,
+    /// The maps of each material that has some.
+    textures: Vec<Option<&'a Textures>>,
     /// Whether no material lets light through.
     pub is_opaque: bool,
+    /// Whether all materials are of models 0 to 2 without halo and maps.
+    pub is_direct: bool,
 }
 
 #[derive(Clone, Debug)]
@@ -47,16 +53,23 @@ impl<'a> World<'a> {
     pub fn new(frame: &'a Frame) -> Self {
         let mut objects = Vec::with_capacity(frame.objects.len());
         let mut materials = vec![MaterialRecord::new(&Material::default())];
+        let mut textures = vec![None];
         let mut first_part = 0;
         for Object { geometry, transform } in &frame.objects {
             let first_material = materials.len() as u32;
             materials.extend(geometry.materials.iter().map(|m| MaterialRecord::new(m)));
+            let maps = |m: &'a Part<Material>| Some(&m.textures).filter(|t| !t.is_empty());
+            textures.extend(geometry.materials.iter().map(maps));
             let transform = transform.as_ref().map(Transform::new);
             objects.push(WorldObject { geometry, first_material, first_part, transform });
             first_part += geometry.meshes.len() as u32;
         }
-        let is_opaque = materials.iter().all(|m| m.d == 1.0);
-        Self { objects, materials, is_opaque }
+        let has_map_d = |t: Option<&Textures>| t.is_some_and(|t| t.map_d.is_some());
+        let is_opaque =
+            materials.iter().all(MaterialRecord::is_opaque) && !textures.iter().copied().any(has_map_d);
+        let is_direct =
+            materials.iter().all(MaterialRecord::is_direct) && textures.iter().all(Option::is_none);
+        Self { objects, materials, textures, is_opaque, is_direct }
     }
 
     /// The surface at a hit of a ray.
@@ -81,11 +94,13 @@ impl<'a> World<'a> {
             }
             Some(t) => {
                 let [a, b, c] = corners.map(|i| t.placement.magnitude(vertex(i)));
-                (corners.map(|i| t.placement.point(vertex(i))), a.max(b).max(c), t.orientation)
+                let p = corners.map(|i| t.placement.point(vertex(i)));
+                (p, a.max(b).max(c) + extent(&p), t.orientation)
             }
         };
         let ng = orientation * triangle_normal(p, -ray.direction);
-        let ng = if ng.dot(ray.direction) > 0.0 { -ng } else { ng };
+        let is_front = ng.dot(ray.direction) <= 0.0;
+        let ng = if is_front { ng } else { -ng };
         let (material, kd) = self.material(object, triangle, corners, weights);
         Surface {
             position: hit_point(&p, hit.barycentric),
@@ -94,7 +109,39 @@ impl<'a> World<'a> {
             magnitude,
             kd,
             material,
+            is_front,
         }
+    }
+
+    /// The maps of a material and where they are looked up at a hit; None where the material has none.
+    pub fn maps(&self, hit: &Hit, material: u32) -> Option<(&'a Textures, Texcoord)> {
+        let textures = self.textures[material as usize]?;
+        let object = &self.objects[hit.object as usize];
+        Some((textures, object.texcoord(hit)))
+    }
+
+    /// The material's place in [`World::materials`] at a hit.
+    pub fn material_of(&self, hit: &Hit) -> u32 {
+        self.objects[hit.object as usize].material(hit.triangle as usize)
+    }
+
+    /// What a material mirrors instead of the scene.
+    pub fn reflection(&self, material: u32) -> Option<&'a Reflection> {
+        self.textures[material as usize]?.refl.as_ref()
+    }
+
+    /// All emitting triangles in order, with their material's emission and their corners in the world.
+    pub fn emitting(&self) -> Vec<(Vec3, [Vec3; 3])> {
+        let mut list = Vec::new();
+        for object in &self.objects {
+            for (i, corners) in object.geometry.triangles.0.iter().enumerate() {
+                let ke = self.materials[object.material(i) as usize].ke;
+                if ke.max_element() > 0.0 {
+                    list.push((ke, object.corners(*corners)));
+                }
+            }
+        }
+        list
     }
 
     /// The dissolve of the material at a hit.
@@ -135,7 +182,50 @@ impl<'a> World<'a> {
     }
 }
 
+/// Where maps are looked up at a point of a triangle.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Texcoord {
+    /// (u, v); None where the triangle has no texture coordinates.
+    pub uv: Option<Vec2>,
+    /// Root of the triangle's area in (u, v) over its area in the world: units of u and v for each unit of width.
+    pub uv_per_width: f32,
+    /// Unit direction of growing u in the triangle's plane; 0 where it has none.
+    pub tangent: Vec3,
+    /// Unit direction of growing v in the triangle's plane; 0 where it has none.
+    pub bitangent: Vec3,
+}
+
 impl WorldObject<'_> {
+    fn corners(&self, corners: [u32; 3]) -> [Vec3; 3] {
+        corners.map(|i| {
+            let p = self.geometry.positions.0[i as usize];
+            self.transform.as_ref().map_or_else(|| p.into(), |t| t.placement.point(p))
+        })
+    }
+
+    fn texcoord(&self, hit: &Hit) -> Texcoord {
+        let none = Texcoord { uv: None, uv_per_width: 0.0, tangent: Vec3::ZERO, bitangent: Vec3::ZERO };
+        let Some(texcoords) = &self.geometry.texcoords else { return none };
+        let corners = texcoords.corners.0[hit.triangle as usize];
+        if corners.contains(&ABSENT) {
+            return none;
+        }
+        let t = corners.map(|i| Vec2::from(texcoords.values.0[i as usize]));
+        let p = self.corners(self.geometry.triangles.0[hit.triangle as usize]);
+        let [u, v] = hit.barycentric;
+        let (e1, e2) = (p[1] - p[0], p[2] - p[0]);
+        let (d1, d2) = (t[1] - t[0], t[2] - t[0]);
+        let uv_area = d1.perp_dot(d2);
+        // position as a function of (u, v): its derivatives, but for the factor 1 / uv_area
+        let side = uv_area.signum();
+        Texcoord {
+            uv: Some(t[0] * (1.0 - u - v) + t[1] * u + t[2] * v),
+            uv_per_width: (uv_area.abs() / e1.cross(e2).length().max(f32::MIN_POSITIVE)).sqrt(),
+            tangent: ((e1 * d2.y - e2 * d1.y) * side).normalize_or_zero(),
+            bitangent: ((e2 * d1.x - e1 * d2.x) * side).normalize_or_zero(),
+        }
+    }
+
     /// The place of a triangle's material in [`World::materials`].
     fn material(&self, triangle: usize) -> u32 {
         let runs = &self.geometry.material_runs.0;

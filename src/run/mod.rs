@@ -15,6 +15,7 @@ mod write;
 pub use event::{Event, FrameReport, Status};
 pub use read::read_frame;
 pub use report::{DeviceReport, Report, Totals};
+pub use source::Sources;
 
 use crate::clock::Stopwatch;
 use crate::device::{Device, Stop};

@@ -4,16 +4,20 @@ use super::RunOptions;
 use super::read::read_options;
 use super::source::Sources;
 use crate::format;
-use crate::job::{Job, LightChoice, Picture, Sequence, auto};
+use crate::job::{Background, Job, LightChoice, Picture, Sequence, auto};
 use crate::math::Bounds;
-use crate::scene::{Camera, Light, Object, Shot};
+use crate::scene::{self, Camera, Light, Map, Object, Part, Shot, Texture};
 use crate::warning::Warnings;
 use rayon::prelude::*;
+use std::collections::HashMap;
+use std::path::PathBuf;
 use std::sync::Arc;
 
 /// What was found out of each sequence, by its place in the job.
 pub(super) struct Prepared {
     sequences: Vec<Found>,
+    /// The background pictures, each read once.
+    backgrounds: HashMap<PathBuf, Result<Part<Texture>, String>>,
     pub(super) sources: Sources,
     pub(super) warnings: Warnings,
 }
@@ -28,9 +32,18 @@ struct Found {
 pub(super) fn prepare(job: &Job, options: &RunOptions) -> Prepared {
     let mut prepared = Prepared {
         sequences: job.sequences.iter().map(|_| Found::default()).collect(),
+        backgrounds: HashMap::new(),
         sources: Sources::default(),
         warnings: job.warnings.clone(),
     };
+    for picture in &job.pictures {
+        if let Background::File(path) = &picture.settings.background
+            && !prepared.backgrounds.contains_key(path)
+        {
+            let read = format::load_picture(path).map_err(|e| e.to_string());
+            prepared.backgrounds.insert(path.clone(), read);
+        }
+    }
     for (i, sequence) in job.sequences.iter().enumerate() {
         let pictures = || job.pictures.iter().filter(|p| p.sequence == i);
         let auto_light = pictures().any(|p| p.settings.lights == LightChoice::Auto);
@@ -53,12 +66,20 @@ pub(super) fn prepare(job: &Job, options: &RunOptions) -> Prepared {
 
 impl Prepared {
     /// The shot of a picture.
-    pub(super) fn shot(&self, picture: &Picture) -> Shot {
+    pub(super) fn shot(&self, picture: &Picture) -> Result<Shot, String> {
         let lights = match &picture.settings.lights {
             LightChoice::Given(lights) => lights.clone(),
             LightChoice::Auto => self.sequences[picture.sequence].light.into_iter().collect(),
         };
-        picture.settings.shot(self.camera(picture), lights)
+        let background = match &picture.settings.background {
+            Background::Color(color) => scene::Background::Color(*color),
+            Background::File(path) => match self.backgrounds.get(path) {
+                Some(Ok(texture)) => scene::Background::Picture(Map::plain(texture.clone())),
+                Some(Err(error)) => return Err(error.clone()),
+                None => return Err(format!("{}: was not read", path.display())),
+            },
+        };
+        Ok(picture.settings.shot(self.camera(picture), lights, background))
     }
 
     fn camera(&self, picture: &Picture) -> Camera {

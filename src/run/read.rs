@@ -9,7 +9,6 @@ use crate::device::Stop;
 use crate::diff::Change;
 use crate::format::{Loaded, ReadOptions};
 use crate::job::{Job, Picture, Settings};
-use crate::kernel;
 use crate::output::{Bits, Encoding, Format, Records};
 use crate::scene::{Frame, Object, PartHash, PartHasher, Shot};
 use crate::warning::Warnings;
@@ -20,7 +19,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::mpsc::Sender;
 
 /// Changes whenever the same inputs may give other pixels, so that pictures of other versions are made anew.
-const PICTURE_VERSION: u64 = 1;
+const PICTURE_VERSION: u64 = 2;
 
 /// A frame that was read and must be traced.
 pub(super) struct ReadFrame {
@@ -101,7 +100,13 @@ impl<'a> Reader<'a> {
             }
         };
         report.triangles = frame.triangles();
-        let shot = self.prepared.shot(picture);
+        let shot = match self.prepared.shot(picture) {
+            Ok(shot) => shot,
+            Err(error) => {
+                report.error = Some(error);
+                return Err(report);
+            }
+        };
         let encoding = encoding(&picture.settings);
         let fingerprint = fingerprint(&frame, &shot, encoding);
         if !self.options.overwrite && self.records.finished(&picture.picture, fingerprint) {
@@ -195,27 +200,16 @@ fn load_frame(
 pub fn read_frame(
     job: &Job,
     picture: &Picture,
+    sources: &Sources,
     lenient: bool,
     warnings: &mut Warnings,
 ) -> Result<Frame, String> {
-    load_frame(job, picture, &Sources::default(), lenient, false, warnings).map(|l| l.frame)
+    load_frame(job, picture, sources, lenient, false, warnings).map(|l| l.frame)
 }
 
 /// Names what of the materials is not rendered as it says, and frames that nothing can be seen of.
 fn warn_of_materials(path: &Path, loaded: &Loaded, warnings: &mut Warnings) {
     let g = &loaded.geometry;
-    for m in &g.materials {
-        if let Some(other) = kernel::fallback(m.illum) {
-            warnings.add(
-                None,
-                None,
-                format!("illum {} is rendered as illum {other} by this version", m.illum),
-            );
-        }
-        if !m.maps.is_empty() {
-            warnings.add(None, None, "textures are not rendered by this version; the constants are used");
-        }
-    }
     let has_faces = !g.triangles.0.is_empty();
     let is_seen = |run: &[u32; 2]| g.materials.get(run[1] as usize).is_none_or(|m| m.d > 0.0);
     if has_faces && !g.material_runs.0.iter().any(is_seen) {
@@ -243,6 +237,7 @@ pub(super) fn encoding(settings: &Settings) -> Encoding {
         format: Format::from_word(&settings.format).unwrap_or(Format::Png),
         bits: Bits::from_number(settings.bits).unwrap_or_default(),
         exposure_stops: settings.exposure_stops,
+        quality: settings.quality,
     }
 }
 

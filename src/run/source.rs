@@ -1,7 +1,7 @@
 //! Loaded files of a run: what stands in more than one picture is parsed once.
 
 use crate::clock::FileTime;
-use crate::format::{self, FormatError, Loaded, ReadOptions};
+use crate::format::{self, FormatError, Loaded, ReadOptions, TextureCache};
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -17,11 +17,12 @@ struct Kept {
     used: bool,
 }
 
-/// Files that will be used again: still layers for the whole run, and first frames that were read for their lights
-/// until their turn comes.
+/// Files that will be used again: still layers for the whole run, first frames that were read for their lights until
+/// their turn comes, and textures as long as frames use them.
 #[derive(Default)]
-pub(super) struct Sources {
+pub struct Sources {
     kept: Mutex<HashMap<PathBuf, Kept>>,
+    textures: TextureCache,
 }
 
 impl Sources {
@@ -60,7 +61,7 @@ impl Sources {
                 return Ok(found);
             }
         }
-        let loaded = Arc::new(format::load_obj(path, options)?);
+        let loaded = Arc::new(format::load_obj(path, options, &self.textures)?);
         if keep {
             let entry = Kept { stamp, options: options.clone(), loaded: Arc::clone(&loaded), used: uses };
             self.kept.lock().unwrap_or_else(PoisonError::into_inner).insert(path.to_path_buf(), entry);

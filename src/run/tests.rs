@@ -30,7 +30,14 @@ fn run(request: &Request, faults: &[(usize, Fault)], options: &RunOptions) -> Ou
     let job = resolve(request).unwrap();
     let mut device = FakeDevice::new("fake", 1 << 20);
     for &(picture, fault) in faults {
-        let frame = read_frame(&job, &job.pictures[picture], false, &mut Warnings::default()).unwrap();
+        let frame = read_frame(
+            &job,
+            &job.pictures[picture],
+            &source::Sources::default(),
+            false,
+            &mut Warnings::default(),
+        )
+        .unwrap();
         device = device.with_fault(frame.hash(), fault);
     }
     render(&job, options, Box::new(device), &Stop::default(), &mut |_| {}).unwrap()
@@ -101,4 +108,11 @@ fn a_run_that_is_told_to_stop_before_it_begins_makes_nothing() {
     let device = Box::new(FakeDevice::new("fake", 1 << 20));
     let outcome = render(&job, &two_threads(), device, &stop, &mut |_| {}).unwrap();
     assert!(outcome.stopped && outcome.report.frames.is_empty() && !t.path().join("out").exists());
+}
+
+#[test]
+fn job_and_output_know_the_same_formats() {
+    for word in crate::job::settings::FORMATS {
+        assert!(crate::output::Format::from_word(word).is_some(), "{word}");
+    }
 }

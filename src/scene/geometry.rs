@@ -3,6 +3,8 @@
 
 use super::material::Material;
 use super::part::{Content, Part, PartHash, PartHasher};
+use super::texture::Texture;
+use std::collections::HashSet;
 
 /// An attribute index that is not there.
 pub const ABSENT: u32 = u32::MAX;
@@ -122,7 +124,12 @@ pub struct Geometry {
 }
 
 impl Geometry {
-    /// The names of all its parts with their bytes, in a fixed order.
+    /// The textures of all its materials, as often as they are used.
+    pub fn textures(&self) -> impl Iterator<Item = &Part<Texture>> {
+        self.materials.iter().flat_map(|m| m.textures.slots()).flatten().map(|map| &map.texture)
+    }
+
+    /// The names of all its parts with their bytes, each once, in a fixed order.
     pub fn parts(&self) -> Vec<(PartHash, u64)> {
         let mut parts = vec![
             (self.positions.hash(), self.positions.bytes()),
@@ -140,6 +147,9 @@ impl Geometry {
             parts.push((c.hash(), c.bytes()));
         }
         parts.extend(self.materials.iter().map(|m| (m.hash(), m.bytes())));
+        let mut seen = HashSet::new();
+        let textures = self.textures().map(|t| (t.hash(), t.bytes()));
+        parts.extend(textures.filter(|(hash, _)| seen.insert(*hash)));
         parts
     }
 

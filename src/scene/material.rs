@@ -1,19 +1,7 @@
 //! Materials as the MTL gives them, with what it leaves out filled in.
 
-use super::part::{Content, PartHash, PartHasher};
+use super::part::{Content, PartHasher};
 use super::texture::{Map, Reflection};
-use std::path::PathBuf;
-
-/// A file that a material names (`map_Kd` and the like).
-#[derive(Clone, Debug, PartialEq)]
-pub struct MapFile {
-    /// The word before it, as `map_Kd`.
-    pub word: String,
-    /// Where it was found; None where it is missing.
-    pub path: Option<PathBuf>,
-    /// Hash of its bytes; None where it is missing.
-    pub content: Option<PartHash>,
-}
 
 /// The maps of a material.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -31,6 +19,11 @@ pub struct Textures {
 }
 
 impl Textures {
+    /// Whether there is no map at all.
+    pub fn is_empty(&self) -> bool {
+        self.refl.is_none() && self.maps().iter().all(Option::is_none)
+    }
+
     /// All maps in a fixed order, without those of `refl`.
     pub fn maps(&self) -> [Option<&Map>; 8] {
         [
@@ -46,19 +39,30 @@ impl Textures {
         .map(Option::as_ref)
     }
 
+    /// All maps there can be in a fixed order: those of [`Self::maps`], the sphere of `refl`, the six faces of its
+    /// cube.
+    pub fn slots(&self) -> [Option<&Map>; 15] {
+        let mut slots = [None; 15];
+        slots[..8].copy_from_slice(&self.maps());
+        match &self.refl {
+            None => {}
+            Some(Reflection::Sphere(map)) => slots[8] = Some(map),
+            Some(Reflection::Cube(faces)) => {
+                slots[9..].copy_from_slice(&faces.each_ref().map(Option::as_ref));
+            }
+        }
+        slots
+    }
+
     fn hash_into(&self, h: &mut PartHasher) {
-        let faces: Vec<Option<&Map>> = match &self.refl {
-            None => Vec::new(),
-            Some(Reflection::Sphere(map)) => vec![Some(map)],
-            Some(Reflection::Cube(faces)) => faces.iter().map(Option::as_ref).collect(),
-        };
-        h.u64(faces.len() as u64);
-        for map in self.maps().into_iter().chain(faces) {
+        for map in self.slots() {
             h.u64(u64::from(map.is_some()));
             if let Some(map) = map {
                 map.hash_into(h);
             }
         }
+        // a cube without faces is black all around, which is not the same as no map
+        h.u64(u64::from(self.refl.is_some()));
     }
 }
 
@@ -89,8 +93,6 @@ pub struct Material {
     pub illum: u8,
     /// Maps of Ka, Kd, Ks, Ke, Ns, d, of heights, and of normals.
     pub textures: Textures,
-    /// Files it names, in the order of the file.
-    pub maps: Vec<MapFile>,
 }
 
 impl Default for Material {
@@ -109,7 +111,6 @@ impl Default for Material {
             ni: 1.0,
             illum: 1,
             textures: Textures::default(),
-            maps: Vec::new(),
         }
     }
 }
@@ -126,13 +127,6 @@ impl Content for Material {
         h.f32(self.ni);
         h.u64(u64::from(self.illum) | u64::from(self.halo) << 8 | u64::from(self.tf_given) << 9);
         self.textures.hash_into(h);
-        for m in &self.maps {
-            h.bytes(m.word.as_bytes());
-            h.u64(u64::from(m.content.is_some()));
-            if let Some(c) = m.content {
-                h.part(c);
-            }
-        }
     }
 
     fn bytes(&self) -> u64 {

@@ -17,7 +17,7 @@ pub use geometry::{
     Triangles,
 };
 pub use light::{Falloff, Light};
-pub use material::{MapFile, Material, Textures};
+pub use material::{Material, Textures};
 pub use part::{Content, Part, PartHash, PartHasher};
-pub use shot::{Aov, AovSet, Filter, Shot};
+pub use shot::{Aov, AovSet, Background, Filter, Shot};
 pub use texture::{Channel, Map, Reflection, TexelSpace, Texels, Texture};

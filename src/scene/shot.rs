@@ -3,6 +3,7 @@
 use super::camera::Camera;
 use super::light::Light;
 use super::part::PartHasher;
+use super::texture::Map;
 use crate::math::Vec3;
 
 /// The pixel filter, sampled, not splatted.
@@ -70,6 +71,15 @@ impl AovSet {
     }
 }
 
+/// What is seen where nothing is hit.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Background {
+    /// A colour, linear RGB.
+    Color(Vec3),
+    /// A picture around the scene, by latitude and longitude.
+    Picture(Map),
+}
+
 /// Everything but the geometry that bears on the film of one frame.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Shot {
@@ -79,8 +89,8 @@ pub struct Shot {
     pub lights: Vec<Light>,
     /// Ambient light Ia, linear RGB.
     pub ambient: Vec3,
-    /// What is seen where nothing is hit, linear RGB.
-    pub background: Vec3,
+    /// What is seen where nothing is hit.
+    pub background: Background,
     /// Width and height in pixels, each 1 or more.
     pub size: [u32; 2],
     /// Samples a pixel, 1 or more.
@@ -107,7 +117,11 @@ impl Shot {
         for l in &self.lights {
             l.hash_into(h);
         }
-        h.slice(&[self.ambient, self.background]);
+        h.slice(&[self.ambient]);
+        match &self.background {
+            Background::Color(color) => h.slice(&[*color]),
+            Background::Picture(map) => map.hash_into(h),
+        }
         h.slice(&self.size);
         h.slice(&[self.samples, self.filter as u32, self.depth, self.seed]);
         h.f32(self.prune);

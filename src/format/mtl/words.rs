@@ -1,6 +1,6 @@
 //! The words of an MTL and what each takes: one row a word.
 
-use super::map;
+use super::map::{MapStatement, Side};
 use crate::format::number;
 use crate::format::text::words;
 
@@ -15,16 +15,62 @@ pub(in crate::format) struct Given {
     pub ks: Option<[f32; 3]>,
     /// Emission.
     pub ke: Option<[f32; 3]>,
+    /// Transmission filter.
+    pub tf: Option<[f32; 3]>,
     /// Specular exponent.
     pub ns: Option<f32>,
+    /// Optical density.
+    pub ni: Option<f32>,
     /// Dissolve.
     pub d: Option<f32>,
+    /// Whether that is of `d -halo`.
+    pub halo: bool,
     /// 1 − dissolve.
     pub tr: Option<f32>,
     /// Illumination model.
     pub illum: Option<u8>,
-    /// Files by word, in the order of the text.
-    pub maps: Vec<(&'static str, Vec<u8>)>,
+    /// Maps in the order of the text, one for each slot.
+    pub maps: Vec<(MapSlot, MapStatement)>,
+}
+
+/// What a map is of.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[allow(missing_docs, reason = "the names are those of the MTL words")]
+pub(in crate::format) enum MapSlot {
+    Ka,
+    Kd,
+    Ks,
+    Ke,
+    Ns,
+    D,
+    Bump,
+    Norm,
+    Refl(Side),
+}
+
+impl MapSlot {
+    /// The word of the MTL.
+    pub(in crate::format) fn word(self) -> &'static str {
+        match self {
+            Self::Ka => "map_Ka",
+            Self::Kd => "map_Kd",
+            Self::Ks => "map_Ks",
+            Self::Ke => "map_Ke",
+            Self::Ns => "map_Ns",
+            Self::D => "map_d",
+            Self::Bump => "bump",
+            Self::Norm => "norm",
+            Self::Refl(_) => "refl",
+        }
+    }
+
+    /// Whether a map of one puts away one of the other: a sphere and the faces of a cube exclude each other.
+    pub(in crate::format) fn replaces(self, other: Self) -> bool {
+        match (self, other) {
+            (Self::Refl(Side::Sphere), Self::Refl(_)) | (Self::Refl(_), Self::Refl(Side::Sphere)) => true,
+            _ => self == other,
+        }
+    }
 }
 
 /// What a word takes, and where that goes.
@@ -37,53 +83,60 @@ enum Takes {
     Dissolve,
     /// A whole number from 0 to 10.
     Model,
-    /// A file, kept under this word.
-    Map(&'static str),
-    /// Something that has no effect.
+    /// A file.
+    Map(MapSlot),
+    /// A file of all surroundings or of one side of them.
+    Reflection,
+    /// Something that has no effect, which is told.
+    Idle,
+    /// Something that has no effect and that nobody misses.
     Ignored,
 }
 
-const WORDS: [(&str, Takes); 40] = [
+const WORDS: [(&str, Takes); 43] = [
     ("Ka", Takes::Color(|g| &mut g.ka)),
     ("Kd", Takes::Color(|g| &mut g.kd)),
     ("Ks", Takes::Color(|g| &mut g.ks)),
     ("Ke", Takes::Color(|g| &mut g.ke)),
+    ("Tf", Takes::Color(|g| &mut g.tf)),
+    ("Kt", Takes::Color(|g| &mut g.tf)),
     ("Ns", Takes::Number(|g| &mut g.ns, 0.0, f32::MAX)),
+    ("Ni", Takes::Number(|g| &mut g.ni, f32::MIN, f32::MAX)),
     ("Tr", Takes::Number(|g| &mut g.tr, 0.0, 1.0)),
     ("d", Takes::Dissolve),
     ("illum", Takes::Model),
-    ("map_Ka", Takes::Map("map_Ka")),
-    ("map_Kd", Takes::Map("map_Kd")),
-    ("map_Ks", Takes::Map("map_Ks")),
-    ("map_Ke", Takes::Map("map_Ke")),
-    ("map_Ns", Takes::Map("map_Ns")),
-    ("map_d", Takes::Map("map_d")),
-    ("bump", Takes::Map("bump")),
-    ("map_bump", Takes::Map("bump")),
-    ("norm", Takes::Map("norm")),
-    ("disp", Takes::Map("disp")),
-    ("map_disp", Takes::Map("disp")),
-    ("refl", Takes::Map("refl")),
-    ("map_refl", Takes::Map("refl")),
-    ("decal", Takes::Map("decal")),
-    ("map_decal", Takes::Map("decal")),
-    ("Tf", Takes::Ignored),
-    ("Kt", Takes::Ignored),
-    ("Ni", Takes::Ignored),
-    ("Km", Takes::Ignored),
+    ("map_Ka", Takes::Map(MapSlot::Ka)),
+    ("map_Kd", Takes::Map(MapSlot::Kd)),
+    ("map_Ks", Takes::Map(MapSlot::Ks)),
+    ("map_Ke", Takes::Map(MapSlot::Ke)),
+    ("map_Ns", Takes::Map(MapSlot::Ns)),
+    ("map_d", Takes::Map(MapSlot::D)),
+    ("bump", Takes::Map(MapSlot::Bump)),
+    ("map_bump", Takes::Map(MapSlot::Bump)),
+    ("norm", Takes::Map(MapSlot::Norm)),
+    ("refl", Takes::Reflection),
+    ("map_refl", Takes::Reflection),
+    ("disp", Takes::Idle),
+    ("map_disp", Takes::Idle),
+    ("decal", Takes::Idle),
+    ("map_decal", Takes::Idle),
+    ("map_Tr", Takes::Idle),
+    ("Pr", Takes::Idle),
+    ("Pm", Takes::Idle),
+    ("Ps", Takes::Idle),
+    ("Pc", Takes::Idle),
+    ("Pcr", Takes::Idle),
+    ("aniso", Takes::Idle),
+    ("anisor", Takes::Idle),
+    ("map_Pr", Takes::Idle),
+    ("map_Pm", Takes::Idle),
+    ("map_Ps", Takes::Idle),
+    ("map_Pc", Takes::Idle),
+    ("map_Pcr", Takes::Idle),
+    ("map_RMA", Takes::Idle),
+    ("Km", Takes::Idle),
     ("sharpness", Takes::Ignored),
     ("map_aat", Takes::Ignored),
-    ("Pr", Takes::Ignored),
-    ("Pm", Takes::Ignored),
-    ("Ps", Takes::Ignored),
-    ("Pc", Takes::Ignored),
-    ("Pcr", Takes::Ignored),
-    ("aniso", Takes::Ignored),
-    ("anisor", Takes::Ignored),
-    ("map_Pr", Takes::Ignored),
-    ("map_Pm", Takes::Ignored),
-    ("map_Ps", Takes::Ignored),
-    ("map_Tr", Takes::Ignored),
 ];
 
 /// Why a statement has no effect.
@@ -96,9 +149,10 @@ pub(in crate::format) enum Refusal {
 }
 
 impl Given {
-    /// Takes one statement. Words are known in any case; said again, the last stands.
-    pub(in crate::format) fn set(&mut self, word: &[u8], value: &[u8]) -> Result<(), Refusal> {
-        let (_, takes) = WORDS
+    /// Takes one statement; gives the word or the options in it that change nothing. Words are known in any case; said
+    /// again, the last stands.
+    pub(in crate::format) fn set(&mut self, word: &[u8], value: &[u8]) -> Result<Vec<&'static str>, Refusal> {
+        let (known, takes) = WORDS
             .iter()
             .find(|(known, _)| word.eq_ignore_ascii_case(known.as_bytes()))
             .ok_or(Refusal::Unknown)?;
@@ -108,20 +162,55 @@ impl Given {
                 *place(self) = Some(number(value).ok_or(Refusal::Malformed)?.clamp(least, greatest));
             }
             Takes::Dissolve => {
-                let value = value.strip_prefix(b"-halo").unwrap_or(value);
-                self.d = Some(number(value).ok_or(Refusal::Malformed)?.clamp(0.0, 1.0));
+                let halo = value.strip_prefix(b"-halo");
+                let d = number(halo.unwrap_or(value)).ok_or(Refusal::Malformed)?;
+                (self.d, self.halo) = (Some(d.clamp(0.0, 1.0)), halo.is_some());
             }
             Takes::Model => self.illum = Some(model(value).ok_or(Refusal::Malformed)?),
-            &Takes::Map(word) => {
-                let name = map::file_name(value).ok_or(Refusal::Malformed)?.to_vec();
-                match self.maps.iter_mut().find(|(known, _)| *known == word) {
-                    Some(map) => map.1 = name,
-                    None => self.maps.push((word, name)),
+            &Takes::Map(slot) => {
+                let mut map = MapStatement::parse(value).ok_or(Refusal::Malformed)?;
+                if map.side.take().is_some() {
+                    map.has_idle("-type");
                 }
+                if !matches!(slot, MapSlot::Bump | MapSlot::Norm) && map.bump_multiplier.take().is_some() {
+                    map.has_idle("-bm");
+                }
+                return Ok(self.set_map(slot, map));
             }
+            Takes::Reflection => {
+                let map = MapStatement::parse(value).ok_or(Refusal::Malformed)?;
+                return Ok(self.set_map(MapSlot::Refl(map.side.unwrap_or(Side::Sphere)), map));
+            }
+            Takes::Idle => return Ok(vec![known]),
             Takes::Ignored => {}
         }
-        Ok(())
+        Ok(Vec::new())
+    }
+
+    fn set_map(&mut self, slot: MapSlot, mut map: MapStatement) -> Vec<&'static str> {
+        let idle = std::mem::take(&mut map.idle);
+        self.maps.retain(|(known, _)| !slot.replaces(*known));
+        self.maps.push((slot, map));
+        idle
+    }
+
+    /// Lays other statements over these: what they say stands.
+    pub(in crate::format) fn lay_over(&mut self, over: Self) {
+        self.ka = over.ka.or(self.ka);
+        self.kd = over.kd.or(self.kd);
+        self.ks = over.ks.or(self.ks);
+        self.ke = over.ke.or(self.ke);
+        self.tf = over.tf.or(self.tf);
+        self.ns = over.ns.or(self.ns);
+        self.ni = over.ni.or(self.ni);
+        self.illum = over.illum.or(self.illum);
+        // d and Tr speak of the same
+        if over.d.is_some() || over.tr.is_some() {
+            (self.d, self.halo, self.tr) = (over.d, over.halo, over.tr);
+        }
+        for (slot, map) in over.maps {
+            self.set_map(slot, map);
+        }
     }
 }
 
@@ -164,13 +253,16 @@ mod tests {
         let g = given(&[
             ("Kd", "0.1 0.2 0.3"),
             ("ks", "0.5"),
+            ("Kt", "0.25"),
             ("Ns", "-3"),
+            ("Ni", "1.5"),
             ("illum", "2.0"),
             ("d", "-halo 0.25"),
         ]);
-        assert_eq!(g.kd, Some([0.1, 0.2, 0.3]));
-        assert_eq!(g.ks, Some([0.5; 3]));
-        assert_eq!((g.ns, g.illum, g.d), (Some(0.0), Some(2), Some(0.25)));
+        assert_eq!((g.kd, g.ks, g.tf), (Some([0.1, 0.2, 0.3]), Some([0.5; 3]), Some([0.25; 3])));
+        assert_eq!((g.ns, g.ni, g.illum), (Some(0.0), Some(1.5), Some(2)));
+        assert_eq!((g.d, g.halo), (Some(0.25), true));
+        assert!(!given(&[("d", "-halo 0.25"), ("d", "0.25")]).halo);
     }
 
     #[test]
@@ -180,6 +272,7 @@ mod tests {
             ("Kd", ""),
             ("Kd", "0.1 0.2"),
             ("Kd", "spectral file.rfl"),
+            ("Tf", "xyz 0.1 0.2 0.3"),
             ("Kd", "nan 0 0"),
             ("Ns", "a"),
             ("illum", "11"),
@@ -194,6 +287,20 @@ mod tests {
     }
 
     #[test]
+    fn what_changes_nothing_is_told() {
+        let idle = |word: &str, value: &str| Given::default().set(word.as_bytes(), value.as_bytes()).unwrap();
+        assert_eq!(idle("map_disp", "a.png"), ["map_disp"]);
+        assert_eq!(idle("PR", "0.5"), ["Pr"]);
+        assert_eq!(idle("map_kd", "-blendu on -type sphere -bm 2 a.png"), ["-blendu", "-type", "-bm"]);
+        assert!(idle("map_bump", "-bm 2 a.png").is_empty() && idle("sharpness", "60").is_empty());
+        assert!(idle("refl", "-type sphere a.png").is_empty());
+    }
+
+    fn slots(given: &Given) -> Vec<(MapSlot, &str)> {
+        given.maps.iter().map(|(slot, map)| (*slot, str::from_utf8(&map.file).unwrap())).collect()
+    }
+
+    #[test]
     fn the_last_stands() {
         let g = given(&[
             ("map_bump", "a.png"),
@@ -202,7 +309,25 @@ mod tests {
             ("Kd", "1"),
             ("Kd", "0.5"),
         ]);
-        assert_eq!(g.maps, [("bump", b"c.png".to_vec()), ("map_Kd", b"b.png".to_vec())]);
+        assert_eq!(slots(&g), [(MapSlot::Kd, "b.png"), (MapSlot::Bump, "c.png")]);
         assert_eq!(g.kd, Some([0.5; 3]));
+    }
+
+    #[test]
+    fn a_sphere_or_a_cube_is_reflected() {
+        let cube = [("refl", "-type cube_top a.png"), ("refl", "-type cube_left b.png")];
+        let faces = [(MapSlot::Refl(Side::Face(3)), "a.png"), (MapSlot::Refl(Side::Face(0)), "b.png")];
+        assert_eq!(slots(&given(&cube)), faces);
+        assert_eq!(slots(&given(&[&[("refl", "s.png")], &cube[..]].concat())), faces);
+        let sphere = given(&[&cube[..], &[("refl", "s.png")]].concat());
+        assert_eq!(slots(&sphere), [(MapSlot::Refl(Side::Sphere), "s.png")]);
+    }
+
+    #[test]
+    fn d_and_tr_are_laid_over_together() {
+        let mut g = given(&[("d", "1"), ("Kd", "0.5"), ("map_Kd", "a.png")]);
+        g.lay_over(given(&[("Tr", "0.25"), ("map_Kd", "b.png")]));
+        assert_eq!((g.d, g.tr, g.kd), (None, Some(0.25), Some([0.5; 3])));
+        assert_eq!(slots(&g), [(MapSlot::Kd, "b.png")]);
     }
 }

@@ -2,7 +2,7 @@
 
 use super::scan::{FaceList, Scan};
 use super::triangulate::triangulate;
-use crate::format::material::Library;
+use crate::format::library::Library;
 use crate::scene::normals::{self, DerivedNormals, Smoothing};
 use crate::scene::{
     ABSENT, Attribute, Colors, Corners, Faces, Geometry, Material, MaterialRuns, Mesh, Normals, Part,

@@ -13,7 +13,7 @@ mod triangulate;
 
 use super::ReadOptions;
 use super::error::FormatError;
-use super::material::Library;
+use super::library::Library;
 use super::text::{Tally, Text, first_word, is_line_end, line_end, shown, trimmed, without_comment};
 use crate::math::{Bounds, DVec3};
 use crate::scene::Geometry;

@@ -52,7 +52,8 @@ fn about(key: &str, wrong: Wrong) -> Wrong {
     Wrong { key: wrong.key.or_else(|| Some(key.to_string())), ..wrong }
 }
 
-fn unexpected(node: &Node, wanted: &str) -> Wrong {
+/// What is told of a value of another kind than what is wanted.
+pub(super) fn unexpected(node: &Node, wanted: &str) -> Wrong {
     let remedy = match node.value {
         Value::Number(_) | Value::Bool(_) if wanted.starts_with("text") => "; put it into quotes",
         _ => "",

@@ -6,14 +6,13 @@ mod scene;
 
 use super::JobError;
 use super::numbers::FrameSet;
-use super::options::{Options, limits};
+use super::options::{Background, Options, limits};
 use super::pattern::Pattern;
 use super::settings::{self, FILTERS, MTL_COLORS};
 use super::track::Placed;
 use super::words::one_of;
-use crate::math::Vec3;
 use crate::scene::AovSet;
-use fields::{Fields, Read, color, frames, list, number, parsed, text, truth, whole};
+use fields::{Fields, Read, color, frames, list, number, parsed, text, truth, unexpected, whole};
 use node::{Node, Value, Wrong};
 use std::io::Read as _;
 use std::path::{Path, PathBuf};
@@ -79,8 +78,7 @@ pub(super) fn read(path: &Path) -> Result<JobFile, JobError> {
     if yaml.len() as u64 > MAX_BYTES {
         return Err(wrong(String::new(), format!("is longer than the {MAX_BYTES} bytes of any job file")));
     }
-    let folder = path.parent().unwrap_or(Path::new(""));
-    parse(&yaml, folder).map_err(|e| wrong(format!(":{}:{}", e.line, e.column), e.to_string()))
+    parse(&yaml, path).map_err(|e| wrong(format!(":{}:{}", e.line, e.column), e.to_string()))
 }
 
 /// Keys that the job and its overrides share.
@@ -108,7 +106,7 @@ const PICTURE_KEYS: [&str; 6] = ["name", "format", "size", "alpha", "bits", "qua
 const JOB_KEYS: [&str; 10] =
     ["version", "name", "sequence", "layers", "frames", "output", "priority", "fps", "clip", "overrides"];
 
-fn parse(yaml: &str, folder: &Path) -> Read<JobFile> {
+fn parse(yaml: &str, said_in: &Path) -> Read<JobFile> {
     let root = node::parse(yaml)?;
     let job = Fields::of(&root, &[&JOB_KEYS, &SCENE_KEYS])?;
     job.get("version", |node| match node.value {
@@ -127,14 +125,14 @@ fn parse(yaml: &str, folder: &Path) -> Read<JobFile> {
         }
         _ => {}
     }
-    let path = |node: &Node| text(node).map(|p| folder.join(p));
+    let path = |node: &Node| path(node, said_in);
     let mut file = JobFile {
         name: job.get("name", plain_name)?,
         sequence: job.get("sequence", path)?,
-        layers: job.get("layers", |node| layers(node, folder))?.unwrap_or_default(),
+        layers: job.get("layers", |node| layers(node, said_in))?.unwrap_or_default(),
         frames: job.get("frames", frames)?,
-        options: scene_options(&job)?,
-        overrides: job.get("overrides", list(override_of))?.unwrap_or_default(),
+        options: scene_options(&job, said_in)?,
+        overrides: job.get("overrides", list(|node| override_of(node, said_in)))?.unwrap_or_default(),
         folder: None,
     };
     job.get("output", |node| {
@@ -143,6 +141,11 @@ fn parse(yaml: &str, folder: &Path) -> Read<JobFile> {
         picture_options(&output, &mut file.options)
     })?;
     Ok(file)
+}
+
+/// A path, relative to the folder of the job file.
+fn path(node: &Node, said_in: &Path) -> Read<PathBuf> {
+    text(node).map(|p| said_in.parent().unwrap_or(Path::new("")).join(p))
 }
 
 /// The job's name becomes a folder's.
@@ -157,11 +160,11 @@ fn plain_name(node: &Node) -> Read<String> {
     Ok(name)
 }
 
-fn scene_options(map: &Fields<'_>) -> Read<Options> {
+fn scene_options(map: &Fields<'_>, said_in: &Path) -> Read<Options> {
     let mut options = Options {
         lights: map.get("lights", scene::lights)?,
         ambient: map.get("ambient", color)?,
-        background: map.get("background", background)?,
+        background: map.get("background", |node| background(node, said_in))?,
         samples: map.get("samples", whole(limits::SAMPLES))?.map(|x| x as u32),
         filter: map.get("filter", parsed(|w| one_of(&FILTERS, w)))?,
         depth: map.get("depth", whole(limits::DEPTH))?.map(|x| x as u32),
@@ -172,7 +175,7 @@ fn scene_options(map: &Fields<'_>) -> Read<Options> {
         aov: map.get("aov", aovs)?,
         mtl_srgb: map.get("mtl_color", parsed(|w| one_of(&MTL_COLORS, w)))?,
         prune: map.get("prune", number(limits::PRUNE))?.map(|x| x as f32),
-        materials: map.get("materials", scene::materials)?.unwrap_or_default(),
+        materials: map.get("materials", |node| scene::materials(node, said_in))?.unwrap_or_default(),
         ..Options::default()
     };
     options.camera = map.get("camera", |node| scene::camera(node, &mut options))?;
@@ -199,12 +202,13 @@ fn size(node: &Node) -> Read<[u32; 2]> {
         .map_err(|_| Wrong::at(node, "expected two numbers of pixels, as [1280, 720]"))
 }
 
-fn background(node: &Node) -> Read<Vec3> {
-    if let Value::Text(_) = node.value {
-        let text = "background pictures are not supported by this version; give a colour, as [0, 0, 0]";
-        return Err(Wrong::at(node, text));
+/// A colour, or a picture's file.
+fn background(node: &Node, said_in: &Path) -> Read<Background> {
+    match node.value {
+        Value::Text(_) => path(node, said_in).map(Background::File),
+        Value::Number(_) | Value::List(_) => color(node).map(Background::Color),
+        _ => Err(unexpected(node, "a colour, as [0, 0, 0], or a picture's file, as sky.hdr")),
     }
-    color(node)
 }
 
 /// A list of words, or words between commas.
@@ -216,9 +220,9 @@ fn aovs(node: &Node) -> Read<AovSet> {
     settings::aovs(words.iter().map(String::as_str)).map_err(|e| Wrong::at(node, e))
 }
 
-fn override_of(node: &Node) -> Read<Override> {
+fn override_of(node: &Node, said_in: &Path) -> Read<Override> {
     let map = Fields::of(node, &[&["frames", "files"], &SCENE_KEYS, &PICTURE_KEYS])?;
-    let mut options = scene_options(&map)?;
+    let mut options = scene_options(&map, said_in)?;
     picture_options(&map, &mut options)?;
     Ok(Override { frames: map.get("frames", frames)?, files: map.get("files", pattern)?, options })
 }
@@ -227,17 +231,17 @@ fn pattern(node: &Node) -> Read<Pattern> {
     Ok(Pattern::new(text(node)?.as_bytes()))
 }
 
-fn layers(node: &Node, folder: &Path) -> Read<Vec<LayerFile>> {
-    let layers = list(|node: &Node| layer(node, folder))(node)?;
+fn layers(node: &Node, said_in: &Path) -> Read<Vec<LayerFile>> {
+    let layers = list(|node: &Node| layer(node, said_in))(node)?;
     if layers.is_empty() {
         return Err(Wrong::at(node, "the list of layers is empty"));
     }
     Ok(layers)
 }
 
-fn layer(node: &Node, folder: &Path) -> Read<LayerFile> {
+fn layer(node: &Node, said_in: &Path) -> Read<LayerFile> {
     let map = Fields::of(node, &[&["sequence", "name", "transform", "frames", "materials"]])?;
-    let path = |node: &Node| text(node).map(|p| folder.join(p));
+    let path = |node: &Node| path(node, said_in);
     let mut layer = LayerFile {
         sequence: map.need("sequence", path)?,
         name: map.get("name", text)?,

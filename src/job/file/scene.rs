@@ -11,6 +11,7 @@ use crate::job::track::{CameraPose, CameraTrack, Key, Placed, Transform};
 use crate::job::words::one_of;
 use crate::math::{DVec3, Vec3};
 use crate::scene::{Falloff, Light};
+use std::path::Path;
 
 fn is_auto(node: &Node) -> bool {
     matches!(&node.value, Value::Text(text) if text == "auto")
@@ -114,13 +115,11 @@ fn light(node: &Node) -> Read<Light> {
     if entries(node)?.len() != 1 {
         return Err(Wrong::at(node, "each light is one of point, directional, spot, area"));
     }
-    if let Some(area) = map.node("area") {
-        return Err(Wrong::at(area, "area lights are not supported by this version"));
-    }
     let point = map.get("point", point)?;
     let directional = map.get("directional", directional)?;
     let spot = map.get("spot", spot)?;
-    point.or(directional).or(spot).ok_or_else(|| Wrong::at(node, "is no light"))
+    let area = map.get("area", area)?;
+    point.or(directional).or(spot).or(area).ok_or_else(|| Wrong::at(node, "is no light"))
 }
 
 fn shine(map: &Fields<'_>) -> Read<(Vec3, f32)> {
@@ -165,8 +164,15 @@ fn spot(node: &Node) -> Read<Light> {
     })
 }
 
+/// All triangles that glow.
+fn area(node: &Node) -> Read<Light> {
+    let map = Fields::of(node, &[&["material", "samples"]])?;
+    map.get("material", parsed(|w| one_of(&[("all", ())], w)))?;
+    Ok(Light::Area { samples: map.get("samples", whole(limits::SAMPLES))?.unwrap_or(1.0) as u32 })
+}
+
 /// For each material by name the words of an MTL and what stands behind them.
-pub(super) fn materials(node: &Node) -> Read<Vec<MaterialOverride>> {
+pub(super) fn materials(node: &Node, said_in: &Path) -> Read<Vec<MaterialOverride>> {
     let mut materials = Vec::new();
     for (name, node) in entries(node)? {
         let mut words = Vec::new();
@@ -177,7 +183,8 @@ pub(super) fn materials(node: &Node) -> Read<Vec<MaterialOverride>> {
             }
             words.push((word.value.clone(), behind(node)?));
         }
-        materials.push(MaterialOverride { name: name.value.clone().into_bytes(), words });
+        let name = name.value.clone().into_bytes();
+        materials.push(MaterialOverride { name, words, said_in: said_in.to_path_buf() });
     }
     Ok(materials)
 }

@@ -1,9 +1,9 @@
 use super::super::options::{CameraChoice, LightChoice};
 use super::*;
-use crate::math::DVec3;
+use crate::math::{DVec3, Vec3};
 
 fn read_text(yaml: &str) -> JobFile {
-    parse(yaml, Path::new("jobs")).unwrap_or_else(|e| panic!("{}:{}: {e}", e.line, e.column))
+    parse(yaml, Path::new("jobs/a.yaml")).unwrap_or_else(|e| panic!("{}:{}: {e}", e.line, e.column))
 }
 
 #[test]
@@ -27,6 +27,7 @@ lights:
   - point: {position: [0, 5, 0], color: [1, 1, 1], intensity: 1, falloff: inverse-square}
   - directional: {direction: [0, -1, 0], intensity: 1}
   - spot: {position: [0,5,0], direction: [0,-1,0], inner: 20, outer: 30}
+  - area: {material: all, samples: 1}
 ambient: [0.1, 0.1, 0.1]
 background: [0, 0, 0]
 samples: 1
@@ -42,7 +43,7 @@ prune: 0
 priority: 0
 materials: {Glass: {Ni: 1.5, illum: 7, Kd: [0.1, 0.2, 0.3]}}
 overrides:
-  - {frames: 10-20, camera: auto, lights: auto}
+  - {frames: 10-20, camera: auto, lights: auto, background: sky.hdr}
   - {files: \"Cornell*\", size: [1920, 1080], format: exr, name: \"{stem}-hd\", samples: 4}
 ",
     );
@@ -50,10 +51,14 @@ overrides:
     assert_eq!(job.layers[0].sequence, Path::new("jobs/room.obj"));
     assert_eq!(job.layers[1].materials.as_deref(), Some(Path::new("jobs/fixed.mtl")));
     assert_eq!(job.layers[2].placed.as_ref().unwrap().keys.len(), 2);
-    assert!(matches!(&job.options.lights, Some(LightChoice::Given(l)) if l.len() == 3));
+    assert!(matches!(&job.options.lights, Some(LightChoice::Given(l)) if l.len() == 4));
     assert_eq!((job.options.up, job.options.size), (Some(DVec3::Z), Some([1280, 720])));
     let glass = &job.options.materials[0];
     assert!(glass.words.contains(&("Kd".to_string(), "0.1 0.2 0.3".to_string())), "{glass:?}");
+    assert_eq!(glass.said_in, Path::new("jobs/a.yaml"));
+    assert_eq!(job.options.background, Some(Background::Color(Vec3::ZERO)));
+    let sky = Background::File("jobs/sky.hdr".into());
+    assert_eq!(job.overrides[0].options.background, Some(sky));
     assert_eq!(job.overrides[1].options.format.as_deref(), Some("exr"));
 }
 
@@ -87,7 +92,7 @@ fn errors_have_line_and_column_what_is_allowed_and_the_nearest_name() {
         ("name: ../x", (3, 7), &["name", "path"]),
         ("lights:\n  - pont: {position: [0, 1, 0]}", (4, 5), &["pont", "did you mean `point`"]),
         ("lights: [{point: {}}]", (3, 18), &["position", "missing"]),
-        ("lights:\n  - area: {material: all}", (4, 11), &["area lights are not supported by this version"]),
+        ("lights:\n  - area: {material: some}", (4, 22), &["material", "some", "all"]),
         (
             "lights: [{point: {position: [0, 0, 0], falloff: inverse}}]",
             (3, 49),
@@ -98,7 +103,8 @@ fn errors_have_line_and_column_what_is_allowed_and_the_nearest_name() {
             (3, 17),
             &["inner is 30"],
         ),
-        ("background: sky.hdr", (3, 13), &["background pictures are not supported by this version"]),
+        ("background: [0, -1, 0]", (3, 13), &["background", "out of range"]),
+        ("background: {sky: 1}", (3, 13), &["background", "a colour", "sky.hdr"]),
         ("output: {format: gif}", (3, 18), &["format", "gif", "png"]),
         ("output: {bits: 12}", (3, 16), &["bits", "8 or 16"]),
         ("output: {size: [1280]}", (3, 16), &["size", "two numbers"]),
