@@ -26,7 +26,8 @@ pub fn lookup(map: &Map, uv: Vec2, footprint: f32) -> [f32; 4] {
 
 /// (u, v) after the map's factors and offsets.
 fn place(map: &Map, uv: Vec2) -> Vec2 {
-    uv * Vec2::from(map.scale) + Vec2::from(map.offset)
+    let placed = uv * Vec2::from(map.scale) + Vec2::from(map.offset);
+    if placed.is_finite() { placed } else { Vec2::ZERO }
 }
 
 /// The colour of a map.
