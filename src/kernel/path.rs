@@ -129,7 +129,7 @@ impl<A: Aggregate> Walk<'_, '_, A> {
         if m.d == 0.0 && !matches!(m.illum, 4 | 6 | 7 | 9) {
             return dissolved(Vec3::ZERO);
         }
-        let bounce = self.bounce(path, surface, p);
+        let bounce = Self::bounce(path, surface, p);
         let f0 = matches!(m.illum, 5 | 7).then(|| Self::f0(path, surface, p));
         let lit = self.lights(path, surface, p, f0);
         let ambient = m.ka * self.scene.shot.ambient + m.ke;
@@ -191,7 +191,7 @@ impl<A: Aggregate> Walk<'_, '_, A> {
     }
 
     /// Where a ray goes on from a surface, by Snell and Schlick.
-    fn bounce(&self, path: &Path, surface: &Surface, p: &Point) -> Bounce {
+    fn bounce(path: &Path, surface: &Surface, p: &Point) -> Bounce {
         let d = path.ray.direction;
         let mirrored = (d + p.n * (2.0 * p.cos)).normalize_or(surface.ng);
         if !matches!(p.material.illum, 5..=7) {

@@ -137,8 +137,10 @@ fn models_0_to_2() {
     assert_near(of(0).rgb[MIDDLE], [0.8, 0.5, 0.2]);
     assert_near(of(1).rgb[MIDDLE], sum(&[A, D]));
     assert_near(of(2).rgb[MIDDLE], sum(&[A, D, S]));
-    // the others fall back to 2
-    assert_near(of(5).rgb[MIDDLE], sum(&[A, D, S]));
+    // a mirror shows the background behind the eye: Ks·Ir with Ks 0.5 0.6 0.1 and Ir 0.1 0.2 0.4; so does model 8
+    let mirrored = [0.05, 0.12, 0.04];
+    assert_near(of(3).rgb[MIDDLE], sum(&[A, D, S, mirrored]));
+    assert_near(of(8).rgb[MIDDLE], sum(&[A, D, S, mirrored]));
     // beside the wall is background: the picture is 2.91 high and 4.85 wide at z = 0, its last column 0.97
     assert_eq!(of(1).rgb[5], [0.1, 0.2, 0.4]);
 }

@@ -11,7 +11,7 @@ pub fn lookup(map: &Map, uv: Vec2, footprint: f32) -> [f32; 4] {
     let texture = &*map.texture;
     let uv = place(map, uv);
     let top = (texture.levels() - 1) as f32;
-    let level = if footprint > 1.0 { footprint.log2().min(top) } else { 0.0 };
+    let level = if footprint > 1.0 { libm::log2f(footprint).min(top) } else { 0.0 };
     let lower = level.floor();
     let a = bilinear(texture, lower as u32, uv, map.clamp);
     let texel = if level > lower {
@@ -26,7 +26,8 @@ pub fn lookup(map: &Map, uv: Vec2, footprint: f32) -> [f32; 4] {
 
 /// (u, v) after the map's factors and offsets.
 fn place(map: &Map, uv: Vec2) -> Vec2 {
-    uv * Vec2::from(map.scale) + Vec2::from(map.offset)
+    let placed = uv * Vec2::from(map.scale) + Vec2::from(map.offset);
+    if placed.is_finite() { placed } else { Vec2::ZERO }
 }
 
 /// The colour of a map.
