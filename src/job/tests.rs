@@ -187,5 +187,7 @@ fn wrong_use_is_refused() {
     assert!(error(&t.request(&["a.yaml", "c.yaml"])).contains("more than one job file"));
     assert!(error(&t.request(&["b.yaml"])).contains("b.yaml:2:1: unknown key `sise`"));
     assert!(error(&t.request(&["c.yaml", "w"])).contains("layers"));
+    t.write("e.yaml", "sequence: w\nfilter: \"\\e[31m\"\n");
+    assert!(!error(&t.request(&["e.yaml"])).contains('\u{1b}'));
     assert!(error(&t.request(&["d.yaml"])).contains("d.yaml"));
 }

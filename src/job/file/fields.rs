@@ -47,9 +47,10 @@ impl<'a> Fields<'a> {
     }
 }
 
-/// Names the innermost key that an error is about.
+/// Names the key that an error is about, with those around it: `camera.eye`.
 fn about(key: &str, wrong: Wrong) -> Wrong {
-    Wrong { key: wrong.key.or_else(|| Some(key.to_string())), ..wrong }
+    let key = wrong.key.map_or_else(|| key.to_string(), |inner| format!("{key}.{inner}"));
+    Wrong { key: Some(key), ..wrong }
 }
 
 /// What is told of a value of another kind than what is wanted.

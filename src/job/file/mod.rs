@@ -78,7 +78,9 @@ pub(super) fn read(path: &Path) -> Result<JobFile, JobError> {
     if yaml.len() as u64 > MAX_BYTES {
         return Err(wrong(String::new(), format!("is longer than the {MAX_BYTES} bytes of any job file")));
     }
-    parse(&yaml, path).map_err(|e| wrong(format!(":{}:{}", e.line, e.column), e.to_string()))
+    // what the file says may be for a terminal to obey
+    let plain = |text: String| text.replace(char::is_control, "\u{fffd}");
+    parse(&yaml, path).map_err(|e| wrong(format!(":{}:{}", e.line, e.column), plain(e.to_string())))
 }
 
 /// Keys that the job and its overrides share.
@@ -108,6 +110,9 @@ const JOB_KEYS: [&str; 10] =
 
 fn parse(yaml: &str, said_in: &Path) -> Read<JobFile> {
     let root = node::parse(yaml)?;
+    if matches!(root.value, Value::Null) {
+        return Err(Wrong::at(&root, "is empty; a job needs either `sequence` or `layers`"));
+    }
     let job = Fields::of(&root, &[&JOB_KEYS, &SCENE_KEYS])?;
     job.get("version", |node| match node.value {
         Value::Number(1.0) => Ok(()),
@@ -119,7 +124,7 @@ fn parse(yaml: &str, said_in: &Path) -> Read<JobFile> {
     job.get("clip", text)?;
 
     match (job.node("sequence"), job.node("layers")) {
-        (None, None) => return Err(Wrong::at(&root, "a job needs `sequence` or `layers`")),
+        (None, None) => return Err(Wrong::at(&root, "a job needs either `sequence` or `layers`")),
         (Some(_), Some(layers)) => {
             return Err(Wrong::at(layers, "a job has either `sequence` or `layers`; remove one"));
         }

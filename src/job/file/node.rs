@@ -23,7 +23,7 @@ pub(super) enum Value {
 pub(super) struct Wrong {
     pub(super) line: u64,
     pub(super) column: u64,
-    /// The key that it is about, if it is about one.
+    /// The key that it is about, if it is about one, behind those around it: `camera.eye`.
     pub(super) key: Option<String>,
     pub(super) text: String,
 }
@@ -47,16 +47,27 @@ impl fmt::Display for Wrong {
 
 /// Reads one YAML 1.2 document. How deep it nests and what aliases make of it are bounded by the library.
 pub(super) fn parse(text: &str) -> Result<Node, Wrong> {
-    // strict booleans: `up: y` is the letter
-    let options = serde_yaml::options! { strict_booleans: true, with_snippet: false };
+    // `up: y` is the letter; a number that is not finite is out of every range
+    let options = serde_yaml::options! {
+        strict_booleans: true,
+        non_finite_float_policy: serde_yaml::NonFiniteFloatPolicy::PassThrough,
+        with_snippet: false,
+    };
     serde_yaml::from_str_with_options(text, options).map_err(|error| {
         let (line, column) = error.location().map_or((1, 1), |l| (l.line(), l.column()));
-        let text = match &error {
+        let cause = match &error {
+            serde_yaml::Error::AliasError { error, .. } => error,
+            error => error,
+        };
+        let text = match cause {
             serde_yaml::Error::DuplicateMappingKey { key, .. } => {
                 format!("duplicate key `{}`; remove one", key.as_deref().unwrap_or_default())
             }
+            serde_yaml::Error::Budget { .. } => {
+                "is too much for a job file with all that its aliases stand for".to_string()
+            }
             // the place stands in front already
-            _ => error.to_string().split(" at line ").next().unwrap_or_default().to_string(),
+            cause => cause.to_string().split(" at line ").next().unwrap_or_default().to_string(),
         };
         Wrong { line, column, key: None, text }
     })

@@ -192,7 +192,7 @@ pub(super) fn materials(node: &Node, said_in: &Path) -> Read<Vec<MaterialOverrid
 /// A number, text, or a list of them, as an MTL has it behind a word.
 fn behind(node: &Node) -> Read<String> {
     match &node.value {
-        Value::Number(x) => Ok(x.to_string()),
+        Value::Number(_) => Ok(number(limits::NUMBER)(node)?.to_string()),
         Value::List(_) => Ok(list(behind)(node)?.join(" ")),
         _ => text(node),
     }

@@ -69,7 +69,11 @@ fn errors_have_line_and_column_what_is_allowed_and_the_nearest_name() {
         ("output: {sise: [64, 64]}", (3, 10), &["output", "sise", "did you mean `size`", "quality"]),
         ("output:\n  sise: [64, 64]", (4, 3), &["sise", "size"]),
         ("sampels: 3", (3, 1), &["sampels", "did you mean `samples`"]),
-        ("camera: {eye: [0, 0, 5], look_at: [0, 0, 0], fov: 400}", (3, 51), &["fov", "400", "0.01 to 179"]),
+        (
+            "camera: {eye: [0, 0, 5], look_at: [0, 0, 0], fov: 400}",
+            (3, 51),
+            &["camera.fov: 400", "0.01 to 179"],
+        ),
         ("camera:\n  eye: [0, 0, 5]\n  look_at: [0, 0, 0]\n  fov: 400", (6, 8), &["fov", "400"]),
         ("camera:\n  keys:\n    - {frame: 1, eye: [0, 0], look_at: [0, 0, 0]}", (5, 23), &["eye", "three"]),
         ("camera: {eye: [0, 0, 5]}", (3, 9), &["camera", "look_at", "missing"]),
@@ -84,7 +88,8 @@ fn errors_have_line_and_column_what_is_allowed_and_the_nearest_name() {
         ("samples:", (3, 8), &["samples", "nothing"]),
         ("samples: '4'", (3, 10), &["samples", "whole number", "the text `4`"]),
         ("seed: 4294967296", (3, 7), &["seed", "out of range"]),
-        ("exposure: .nan", (3, 11), &[".nan"]),
+        ("exposure: .nan", (3, 11), &["exposure", "NaN", "out of range"]),
+        ("materials: {a: {Kd: [.inf, 0, 0]}}", (3, 22), &["inf", "out of range"]),
         ("filter: bx", (3, 9), &["filter", "bx", "did you mean `box`"]),
         ("up: x", (3, 5), &["up", "y, z"]),
         ("up: [0, 0, 0]", (3, 5), &["up", "direction"]),
@@ -137,8 +142,9 @@ fn errors_have_line_and_column_what_is_allowed_and_the_nearest_name() {
 #[test]
 fn errors_of_layers_and_of_the_whole() {
     let cases: &[(&str, (u64, u64), &str)] = &[
-        ("version: 1\n", (1, 1), "needs `sequence` or `layers`"),
-        ("", (1, 1), "a map"),
+        ("version: 1\n", (1, 1), "needs either `sequence` or `layers`"),
+        ("", (1, 1), "is empty"),
+        ("# nothing\n", (2, 1), "is empty"),
         ("- a\n- b\n", (1, 1), "a map"),
         ("sequence: a\nversion: 2\n", (2, 10), "version 1"),
         ("layers: []\n", (1, 9), "empty"),
