@@ -69,7 +69,7 @@ const ONE_PLACE: &[OnePlace] = &[
     },
     OnePlace {
         rule: "only output knows picture formats; format decodes textures",
-        names: &["png", "exr", "image", "openjp2"],
+        names: &["png", "exr", "image", "openjp2", "tiff"],
         places: Places::Only(&["output", "format"]),
     },
     OnePlace {
@@ -85,6 +85,7 @@ const ONE_PLACE: &[OnePlace] = &[
             "exr::image::write",
             "exr::block::writ*",
             "openjp2",
+            "tiff",
         ],
         places: Places::Only(&["output"]),
     },

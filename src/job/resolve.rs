@@ -201,7 +201,10 @@ impl Resolving<'_> {
             options.lay_over(&job.overrides[i].options);
         }
         options.lay_over(&self.request.options);
-        let settings = Arc::new(Settings::new(&options).map_err(JobError::Options)?);
+        let settings = Settings::new(&options).map(Arc::new).map_err(JobError::Options)?;
+        if let Some(text) = settings.left_out() {
+            self.warnings.add(None, None, text);
+        }
         self.settings.insert(applying, Arc::clone(&settings));
         Ok(settings)
     }

@@ -13,10 +13,12 @@ pub const FORMATS: [&str; 19] = [
     "tga", "webp", "qoi", "hdr",
 ];
 
-/// Those that hold 16 bits a channel.
-const SIXTEEN_BITS: [&str; 6] = ["png", "tif", "tiff", "ppm", "pgm", "jp2"];
+/// Those that have alpha.
+pub const ALPHA: [&str; 7] = ["png", "exr", "tif", "tiff", "tga", "webp", "qoi"];
+/// Those that hold integers of 16 bits a channel.
+pub const SIXTEEN_BITS: [&str; 6] = ["png", "tif", "tiff", "ppm", "pgm", "jp2"];
 /// Those that hold floats, whatever the bits.
-const FLOATS: [&str; 2] = ["exr", "hdr"];
+pub const FLOATS: [&str; 2] = ["exr", "hdr"];
 
 /// Pixel filters by their words.
 pub const FILTERS: [(&str, Filter); 3] =
@@ -113,6 +115,17 @@ impl Settings {
             exposure_stops: o.exposure.unwrap_or(0.0),
             name: o.name,
             read,
+        })
+    }
+
+    /// What is asked for but not in pictures of this format, where there is such.
+    pub fn left_out(&self) -> Option<String> {
+        (self.alpha && !ALPHA.contains(&&*self.format)).then(|| {
+            let have = ALPHA.join(", ");
+            format!(
+                "{} has no alpha: what covers a pixel in part stands on black ({have} have it)",
+                self.format
+            )
         })
     }
 
@@ -321,6 +334,12 @@ mod tests {
             Settings::new(&Options { format: Some(format.to_string()), bits: Some(16), ..Options::default() })
                 .is_ok()
         };
+        let clear = |format: &str| {
+            let o = Options { format: Some(format.to_string()), alpha: Some(true), ..Options::default() };
+            Settings::new(&o).unwrap().left_out()
+        };
+        assert!(clear("webp").is_none() && Settings::new(&Options::default()).unwrap().left_out().is_none());
+        assert!(clear("jpg").unwrap().starts_with("jpg has no alpha"));
         assert!(sixteen("jp2") && sixteen("exr") && !sixteen("bmp"));
     }
 }

@@ -1,7 +1,7 @@
 //! Which files a picture has, and the encoder of each format.
 
 use super::error::OutputError;
-use super::{exr, jp2, png, pnm, rasters, sun};
+use super::{exr, hdr, jp2, png, pnm, rasters, sun, tiff};
 use crate::film::Film;
 use crate::scene::{AovSet, PartHasher};
 use std::path::{Path, PathBuf};
@@ -19,23 +19,23 @@ pub enum Format {
     Pgm,
     /// Portable bitmap, binary (P4): that, cut at one half.
     Pbm,
-    /// JPEG.
+    /// JPEG: no alpha, as good as [`Encoding::quality`] says.
     Jpeg,
-    /// Windows bitmap.
+    /// Windows bitmap: no alpha.
     Bmp,
-    /// TIFF.
+    /// TIFF: integers on the sRGB curve, straight alpha.
     Tiff,
-    /// JPEG 2000, lossless.
+    /// JPEG 2000, lossless: no alpha.
     Jp2,
-    /// Sun raster.
+    /// Sun raster: no alpha.
     Sun,
-    /// Truevision TGA.
+    /// Truevision TGA: straight alpha.
     Tga,
-    /// WebP, lossless.
+    /// WebP, lossless: straight alpha.
     Webp,
-    /// Quite OK Image.
+    /// Quite OK Image: straight alpha.
     Qoi,
-    /// Radiance HDR: linear floats with a shared exponent.
+    /// Radiance HDR: linear floats with a shared exponent, no alpha.
     Hdr,
 }
 
@@ -56,13 +56,13 @@ const FORMATS: [FormatLine; 14] = [
     line(Format::Pbm, &["pbm"], |film, encoding| Ok(pnm::encode_pbm(film, encoding))),
     line(Format::Jpeg, &["jpg", "jpeg", "jpe"], rasters::encode_jpeg),
     line(Format::Bmp, &["bmp", "dib"], rasters::encode_bmp),
-    line(Format::Tiff, &["tif", "tiff"], rasters::encode_tiff),
+    line(Format::Tiff, &["tif", "tiff"], tiff::encode),
     line(Format::Jp2, &["jp2"], jp2::encode),
     line(Format::Sun, &["sr", "ras"], sun::encode),
     line(Format::Tga, &["tga"], rasters::encode_tga),
     line(Format::Webp, &["webp"], rasters::encode_webp),
     line(Format::Qoi, &["qoi"], rasters::encode_qoi),
-    FormatLine { linear: true, ..line(Format::Hdr, &["hdr"], |film, _| rasters::encode_hdr(film)) },
+    FormatLine { linear: true, ..line(Format::Hdr, &["hdr"], hdr::encode) },
 ];
 
 type Encode = fn(&Film, Encoding) -> Result<Vec<u8>, String>;

@@ -42,7 +42,7 @@ pub enum OutputError {
         why: String,
     },
     /// A file is not a picture that can be read.
-    #[error("{}: is not a picture that can be compared: {why}; PNG, PPM and EXR are read", path.display())]
+    #[error("{}: is not a picture that can be compared: {why}; all formats but jp2 and sr are read", path.display())]
     Decode {
         /// Which.
         path: PathBuf,

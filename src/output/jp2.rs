@@ -5,8 +5,8 @@ use super::encoding::{Bits, Encoding};
 use crate::film::Film;
 use crate::film::quantize::{quantize8, quantize16};
 use openjp2::openjpeg::{
-    OPJ_CODEC_JP2, opj_stream_create, opj_stream_destroy, opj_stream_set_seek_function,
-    opj_stream_set_skip_function, opj_stream_set_user_data, opj_stream_set_write_function, opj_stream_t,
+    OPJ_CODEC_JP2, opj_stream_set_seek_function, opj_stream_set_skip_function, opj_stream_set_user_data,
+    opj_stream_set_write_function, opj_stream_t,
 };
 use openjp2::{Codec, Stream, opj_cparameters_t, opj_image, opj_image_comptparm};
 use std::ffi::c_void;
@@ -48,7 +48,8 @@ pub(super) fn encode(film: &Film, encoding: Encoding) -> Result<Vec<u8>, String>
     parameters.tcp_mct = 1;
     // small pictures cannot be halved six times
     parameters.numresolution = (width.min(height).ilog2() + 1).min(6) as i32;
-    parameters.set_comment("");
+    // without one the encoder writes its name, and the codestream may not have an empty one
+    parameters.set_comment(" ");
     let mut codec = Codec::new_encoder(OPJ_CODEC_JP2).ok_or("the encoder is not there")?;
     let done =
         |ok: i32, what: &str| if ok == 1 { Ok(()) } else { Err(format!("the encoder fails to {what}")) };
@@ -70,20 +71,20 @@ struct Output {
 }
 
 impl Output {
-    /// Runs an encoder over a stream that writes here.
+    /// Runs an encoder over a stream that writes here; what the stream still holds then is written too.
     fn stream<T>(&mut self, encode: impl FnOnce(&mut Stream) -> T) -> T {
-        // SAFETY: the stream is made here, is not null, and is destroyed before `self` is used again; the callbacks
-        // get the pointer to `self` that is set here and take nothing else for granted
+        let mut stream = Stream::new_custom(1 << 16, false);
+        let handle: *mut opj_stream_t = std::ptr::from_mut(&mut stream).cast();
+        // SAFETY: `handle` points to a `Stream`, which is what the crate makes of it again. The callbacks get the
+        // pointer to `self` given here, which outlives `stream`: that is dropped when this function returns or unwinds,
+        // and `self` is borrowed until then.
         unsafe {
-            let stream: *mut opj_stream_t = opj_stream_create(1 << 16, 0);
-            opj_stream_set_user_data(stream, std::ptr::from_mut(self).cast(), None);
-            opj_stream_set_write_function(stream, Some(write));
-            opj_stream_set_skip_function(stream, Some(skip));
-            opj_stream_set_seek_function(stream, Some(seek));
-            let result = encode(&mut *stream.cast::<Stream>());
-            opj_stream_destroy(stream);
-            result
+            opj_stream_set_user_data(handle, std::ptr::from_mut(self).cast(), None);
+            opj_stream_set_write_function(handle, Some(write));
+            opj_stream_set_skip_function(handle, Some(skip));
+            opj_stream_set_seek_function(handle, Some(seek));
         }
+        encode(&mut stream)
     }
 
     fn write(&mut self, new: &[u8]) {
@@ -94,37 +95,35 @@ impl Output {
         self.bytes[self.place..end].copy_from_slice(new);
         self.place = end;
     }
+
+    /// Goes to a place; false where there is none such.
+    fn go(&mut self, place: Option<i64>) -> bool {
+        let place = place.and_then(|place| usize::try_from(place).ok());
+        self.place = place.unwrap_or(self.place);
+        place.is_some()
+    }
 }
 
-// SAFETY: called by the encoder with `count` readable bytes and the pointer given to `opj_stream_set_user_data`, which
-// is a valid `Output` that nothing else uses meanwhile
+// SAFETY: called with `count` readable bytes of a slice and the pointer given to `opj_stream_set_user_data`, which is a
+// valid `Output` that nothing else uses meanwhile.
 unsafe extern "C" fn write(bytes: *mut c_void, count: usize, output: *mut c_void) -> usize {
-    // SAFETY: as above
+    // SAFETY: as above.
     let (bytes, output) =
         unsafe { (std::slice::from_raw_parts(bytes.cast::<u8>(), count), &mut *output.cast::<Output>()) };
     output.write(bytes);
     count
 }
 
-// SAFETY: called with the pointer given to `opj_stream_set_user_data`
+// SAFETY: called with the pointer given to `opj_stream_set_user_data`, as `write` is.
 unsafe extern "C" fn skip(count: i64, output: *mut c_void) -> i64 {
-    // SAFETY: as above
+    // SAFETY: as above.
     let output = unsafe { &mut *output.cast::<Output>() };
-    match usize::try_from(output.place as i64 + count) {
-        Ok(place) => {
-            output.place = place;
-            count
-        }
-        Err(_) => -1,
-    }
+    if output.go((output.place as i64).checked_add(count)) { count } else { -1 }
 }
 
-// SAFETY: called with the pointer given to `opj_stream_set_user_data`
+// SAFETY: called with the pointer given to `opj_stream_set_user_data`, as `write` is.
 unsafe extern "C" fn seek(place: i64, output: *mut c_void) -> i32 {
-    // SAFETY: as above
+    // SAFETY: as above.
     let output = unsafe { &mut *output.cast::<Output>() };
-    usize::try_from(place).map_or(0, |place| {
-        output.place = place;
-        1
-    })
+    i32::from(output.go(Some(place)))
 }

@@ -9,6 +9,7 @@ mod encoding;
 mod error;
 mod exr;
 mod finish;
+mod hdr;
 mod jp2;
 mod owner;
 mod png;
@@ -19,6 +20,7 @@ mod record_name;
 mod records;
 mod run_log;
 mod sun;
+mod tiff;
 
 pub use atomic::write_atomic;
 pub use compare::{PictureComparison, PictureOutcome, compare_paths};

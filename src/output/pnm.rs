@@ -4,8 +4,7 @@
 use super::encoding::{Bits, Encoding};
 use super::png::big_endian;
 use crate::film::Film;
-use crate::film::color::{gain_from_stops, luma};
-use crate::film::quantize::{quantize8, quantize16};
+use crate::film::quantize::{luma8, luma16, quantize8, quantize16};
 
 /// Colour.
 pub(super) fn encode_ppm(film: &Film, encoding: Encoding) -> Vec<u8> {
@@ -19,17 +18,17 @@ pub(super) fn encode_ppm(film: &Film, encoding: Encoding) -> Vec<u8> {
 
 /// Rec. 709 luma of linear light, then the curve.
 pub(super) fn encode_pgm(film: &Film, encoding: Encoding) -> Vec<u8> {
-    let luma = gray(film, encoding.exposure_stops);
+    let stops = encoding.exposure_stops;
     let (max, rows) = match encoding.bits {
-        Bits::Eight => (255, every_third(&quantize8(&luma, None, 0.0))),
-        Bits::Sixteen => (65535, big_endian(&every_third(&quantize16(&luma, None, 0.0)))),
+        Bits::Eight => (255, luma8(&film.rgb, stops)),
+        Bits::Sixteen => (65535, big_endian(&luma16(&film.rgb, stops))),
     };
     with_header(&format!("P5\n{} {}\n{max}\n", film.size[0], film.size[1]), rows)
 }
 
 /// The luma on the curve, cut at one half; 1 is black, rows begin at a byte, the leftmost pixel is the highest bit.
 pub(super) fn encode_pbm(film: &Film, encoding: Encoding) -> Vec<u8> {
-    let codes = every_third(&quantize8(&gray(film, encoding.exposure_stops), None, 0.0));
+    let codes = luma8(&film.rgb, encoding.exposure_stops);
     let [width, height] = film.size;
     let rows = codes.chunks(width as usize).flat_map(|row| {
         row.chunks(8).map(|eight| {
@@ -38,16 +37,6 @@ pub(super) fn encode_pbm(film: &Film, encoding: Encoding) -> Vec<u8> {
         })
     });
     with_header(&format!("P4\n{width} {height}\n"), rows.collect())
-}
-
-/// The luma of what a colour picture shows: after exposure and clamp.
-fn gray(film: &Film, exposure_stops: f32) -> Vec<[f32; 3]> {
-    let gain = gain_from_stops(exposure_stops);
-    film.rgb.iter().map(|rgb| [luma(rgb.map(|x| (x * gain).clamp(0.0, 1.0))); 3]).collect()
-}
-
-fn every_third<T: Copy>(values: &[T]) -> Vec<T> {
-    values.iter().step_by(3).copied().collect()
 }
 
 fn with_header(header: &str, rows: Vec<u8>) -> Vec<u8> {

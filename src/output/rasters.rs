@@ -1,13 +1,14 @@
-//! Formats that the image crate encodes.
+//! Formats of 8 bits that the image crate encodes as they are promised. Those without alpha have what covers a pixel in
+//! part on black.
 
-use super::encoding::{Bits, Encoding};
+use super::encoding::Encoding;
 use crate::film::Film;
-use crate::film::quantize::{quantize8, quantize16};
-use image::codecs::{bmp, hdr, jpeg, qoi, tga, tiff, webp};
+use crate::film::quantize::quantize8;
+use image::codecs::{bmp, jpeg, qoi, tga, webp};
 use image::{ExtendedColorType, ImageEncoder, ImageResult};
 use std::io::Cursor;
 
-/// JPEG without alpha: what covers a pixel in part stands on black.
+/// JPEG without alpha; colour as fine as brightness (4:4:4).
 pub(super) fn encode_jpeg(film: &Film, encoding: Encoding) -> Result<Vec<u8>, String> {
     let rows = quantize8(&film.rgb, None, encoding.exposure_stops);
     written(|out| {
@@ -16,7 +17,7 @@ pub(super) fn encode_jpeg(film: &Film, encoding: Encoding) -> Result<Vec<u8>, St
     })
 }
 
-/// BMP without alpha.
+/// BMP without alpha, which few readers of it expect.
 pub(super) fn encode_bmp(film: &Film, encoding: Encoding) -> Result<Vec<u8>, String> {
     let rows = quantize8(&film.rgb, None, encoding.exposure_stops);
     written(|out| {
@@ -25,7 +26,8 @@ pub(super) fn encode_bmp(film: &Film, encoding: Encoding) -> Result<Vec<u8>, Str
     })
 }
 
-/// TGA.
+/// TGA, straight alpha. Not run-length coded: the encoder lets runs go on into the next row, which TGA 2.0 forbids and
+/// readers take badly.
 pub(super) fn encode_tga(film: &Film, encoding: Encoding) -> Result<Vec<u8>, String> {
     let (rows, color) = eight_bits(film, encoding);
     written(|out| {
@@ -33,36 +35,16 @@ pub(super) fn encode_tga(film: &Film, encoding: Encoding) -> Result<Vec<u8>, Str
     })
 }
 
-/// WebP, lossless.
+/// WebP, lossless, straight alpha.
 pub(super) fn encode_webp(film: &Film, encoding: Encoding) -> Result<Vec<u8>, String> {
     let (rows, color) = eight_bits(film, encoding);
     written(|out| webp::WebPEncoder::new_lossless(out).write_image(&rows, film.size[0], film.size[1], color))
 }
 
-/// QOI.
+/// QOI, straight alpha.
 pub(super) fn encode_qoi(film: &Film, encoding: Encoding) -> Result<Vec<u8>, String> {
     let (rows, color) = eight_bits(film, encoding);
     written(|out| qoi::QoiEncoder::new(out).write_image(&rows, film.size[0], film.size[1], color))
-}
-
-/// TIFF, uncompressed.
-pub(super) fn encode_tiff(film: &Film, encoding: Encoding) -> Result<Vec<u8>, String> {
-    let (rows, color) = match encoding.bits {
-        Bits::Eight => eight_bits(film, encoding),
-        Bits::Sixteen => {
-            let samples = quantize16(&film.rgb, film.alpha.as_deref(), encoding.exposure_stops);
-            let color =
-                if film.alpha.is_some() { ExtendedColorType::Rgba16 } else { ExtendedColorType::Rgb16 };
-            (samples.iter().flat_map(|s| s.to_ne_bytes()).collect(), color)
-        }
-    };
-    written(|out| tiff::TiffEncoder::new(out).write_image(&rows, film.size[0], film.size[1], color))
-}
-
-/// Radiance HDR: linear light as it is, without alpha.
-pub(super) fn encode_hdr(film: &Film) -> Result<Vec<u8>, String> {
-    let pixels: Vec<image::Rgb<f32>> = film.rgb.iter().map(|&c| image::Rgb(c)).collect();
-    written(|out| hdr::HdrEncoder::new(out).encode(&pixels, film.size[0] as usize, film.size[1] as usize))
 }
 
 /// RGB or, where the film has alpha, RGBA with straight colour.

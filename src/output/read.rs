@@ -1,10 +1,12 @@
-//! Pictures read back from files, to be compared: PNG, PPM and EXR, known by their first bytes.
+//! Pictures read back from files, to be compared: all formats that are written but JPEG 2000 and Sun raster, known by
+//! their first bytes.
 
+use super::encoding::Format;
 use super::error::OutputError;
 use crate::film::compare::{Channel, Picture, Samples};
 use exr::meta::header::Header;
 use exr::prelude::{FlatSamples, MetaData, ReadChannels, ReadLayers, read};
-use image::{ImageReader, Limits};
+use image::{DynamicImage, ImageFormat, ImageReader, Limits};
 use std::fs::File;
 use std::io::{Cursor, Read};
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -15,12 +17,14 @@ const SIDE_MAX: u32 = 1 << 16;
 /// Most bytes of a picture's file, and of its decoded samples.
 const PICTURE_BYTES_MAX: u64 = 4 << 30;
 
+const RGBA: [&str; 4] = ["R", "G", "B", "A"];
 const EXR_MAGIC: [u8; 4] = [0x76, 0x2f, 0x31, 0x01];
 
 /// Reads a picture. A broken file is an error, also where a decoder panics on it.
 pub fn read_picture(path: &Path) -> Result<Picture, OutputError> {
     let bytes = read_bytes(path)?;
-    let decode = || if bytes.starts_with(&EXR_MAGIC) { decode_exr(&bytes) } else { decode_integers(&bytes) };
+    let decode =
+        || if bytes.starts_with(&EXR_MAGIC) { decode_exr(&bytes) } else { decode_image(&bytes, path) };
     catch_unwind(AssertUnwindSafe(decode))
         .unwrap_or_else(|_| Err("the decoder failed on it".into()))
         .map_err(|why| OutputError::Decode { path: path.to_path_buf(), why })
@@ -37,28 +41,33 @@ fn read_bytes(path: &Path) -> Result<Vec<u8>, OutputError> {
     Ok(bytes)
 }
 
-fn decode_integers(bytes: &[u8]) -> Result<Picture, String> {
+fn decode_image(bytes: &[u8], path: &Path) -> Result<Picture, String> {
     let mut limits = Limits::default();
     limits.max_image_width = Some(SIDE_MAX);
     limits.max_image_height = Some(SIDE_MAX);
     limits.max_alloc = Some(PICTURE_BYTES_MAX);
     let mut reader = ImageReader::new(Cursor::new(bytes)).with_guessed_format().map_err(|e| e.to_string())?;
+    // a TGA has no first bytes of its own
+    if reader.format().is_none() && Format::of_file(path) == Some(Format::Tga) {
+        reader.set_format(ImageFormat::Tga);
+    }
     reader.limits(limits);
     let decoded = reader.decode().map_err(|e| e.to_string())?;
     let size = [decoded.width(), decoded.height()];
     // of 8 bits, v becomes 257 v: the same share of the greatest value
-    let channels = if decoded.color().has_alpha() {
-        shares(&["R", "G", "B", "A"], decoded.into_rgba16().as_raw())
-    } else {
-        shares(&["R", "G", "B"], decoded.into_rgb16().as_raw())
+    let channels = match decoded {
+        DynamicImage::ImageRgb32F(pixels) => channels(&RGBA[..3], pixels.as_raw(), Samples::Float),
+        DynamicImage::ImageRgba32F(pixels) => channels(&RGBA, pixels.as_raw(), Samples::Float),
+        _ if decoded.color().has_alpha() => channels(&RGBA, decoded.into_rgba16().as_raw(), Samples::Share),
+        _ => channels(&RGBA[..3], decoded.into_rgb16().as_raw(), Samples::Share),
     };
     Ok(Picture { size, channels })
 }
 
-fn shares(names: &[&str], interleaved: &[u16]) -> Vec<Channel> {
+fn channels<T: Copy>(names: &[&str], interleaved: &[T], samples: fn(Vec<T>) -> Samples) -> Vec<Channel> {
     let channel = |(i, name): (usize, &&str)| {
         let values = interleaved.iter().skip(i).step_by(names.len()).copied();
-        Channel { name: (*name).to_string(), samples: Samples::Share(values.collect()) }
+        Channel { name: (*name).to_string(), samples: samples(values.collect()) }
     };
     names.iter().enumerate().map(channel).collect()
 }
