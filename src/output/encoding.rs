@@ -181,3 +181,18 @@ pub fn picture_files(
     }
     Ok(files)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::job::settings;
+
+    #[test]
+    fn the_table_is_in_order_and_has_the_words_of_the_job() {
+        for (i, line) in FORMATS.iter().enumerate() {
+            assert_eq!(line.format as usize, i);
+        }
+        let words: Vec<&str> = FORMATS.iter().flat_map(|line| line.words).copied().collect();
+        assert_eq!(words, settings::FORMATS);
+    }
+}

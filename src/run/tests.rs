@@ -109,10 +109,3 @@ fn a_run_that_is_told_to_stop_before_it_begins_makes_nothing() {
     let outcome = render(&job, &two_threads(), device, &stop, &mut |_| {}).unwrap();
     assert!(outcome.stopped && outcome.report.frames.is_empty() && !t.path().join("out").exists());
 }
-
-#[test]
-fn job_and_output_know_the_same_formats() {
-    for word in crate::job::settings::FORMATS {
-        assert!(crate::output::Format::from_word(word).is_some(), "{word}");
-    }
-}
