@@ -92,7 +92,8 @@ fn jpeg_is_near_and_nearer_with_quality() {
 #[test]
 fn gray_is_the_luma_of_the_png() {
     let linear = |code: u8| rentix::film::color::linear_from_srgb(f64::from(code) / 255.0);
-    let luma = png(Bits::Eight, false).into_rgb8().pixels().map(|p| {
+    let colour = png(Bits::Eight, false).into_rgb8();
+    let luma = colour.pixels().map(|p| {
         let [r, g, b] = p.0.map(linear);
         255.0 * rentix::film::color::srgb_from_linear(0.2126 * r + 0.7152 * g + 0.0722 * b)
     });
@@ -219,9 +220,9 @@ fn compare_reads_them() {
 
 #[test]
 fn what_a_format_cannot_hold_is_refused() {
-    let wide = Film::new([16384, 1], false, AovSet::default());
+    let wide = Film::new([16385, 1], false, AovSet::default());
     let error = picture_files(Path::new("a"), &wide, encoding("webp", Bits::Eight)).unwrap_err().to_string();
-    assert!(error.starts_with("a film of 16384x1 pixels cannot become webp: "), "{error}");
+    assert!(error.starts_with("a film of 16385x1 pixels cannot become webp: "), "{error}");
 }
 
 /// `convert` of `ImageMagick`, as interleaved samples of 16 bits.

@@ -35,6 +35,7 @@ pub(super) fn encode(film: &Film, _: Encoding) -> Result<Vec<u8>, String> {
 
 /// Mantissas m and exponent e, so that a channel is m / 256 · 2^(e − 128), rounded down. What is negative or not a
 /// number is 0, what is too large the greatest there is.
+#[expect(clippy::manual_clamp, reason = "`clamp` keeps what is not a number")]
 fn rgbe(rgb: [f32; 3]) -> [u8; 4] {
     /// 255 / 256 · 2^127
     const GREATEST: f32 = 1.694_817_3e38;
