@@ -5,6 +5,9 @@ use std::ffi::OsString;
 use std::fs;
 use std::path::{Path, PathBuf};
 
+/// No file has a longer name with its folders; what names one is not worth looking for.
+const MAX_NAME_BYTES: usize = 4096;
+
 /// Finds files by name. A folder is listed once, and only when a name is not there as written.
 #[derive(Debug, Default)]
 pub(super) struct Lookup {
@@ -16,7 +19,7 @@ impl Lookup {
     /// Looks for a plain file: as written in each of the folders, then with either slash and in any case, last by
     /// the name behind the last slash.
     pub(super) fn find(&mut self, name: &[u8], folders: &[&Path]) -> Option<PathBuf> {
-        if name.is_empty() {
+        if name.is_empty() || name.len() > MAX_NAME_BYTES {
             return None;
         }
         let as_written = path_from_bytes(name);
@@ -111,6 +114,7 @@ mod tests {
         for name in ["", "/", "Maps", "wood.png", "absent.png", "both.png\0"] {
             assert_eq!(find(name), None, "{name}");
         }
+        assert_eq!(find(&format!("{}both.png", "./".repeat(3000))), None, "longer than any name");
         let absolute = mtl.join("both.png");
         assert_eq!(find(absolute.to_str().unwrap()).as_deref(), Some("mtl/both.png"));
     }
