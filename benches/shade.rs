@@ -12,8 +12,8 @@ use rentix::kernel::camera::{CameraConstants, camera_ray};
 use rentix::math::{DVec3, Vec3};
 use rentix::plan::plan_frame;
 use rentix::scene::{
-    AovSet, Camera, Faces, Falloff, Filter, Frame, Geometry, Light, Material, MaterialRuns, Mesh, Object,
-    Part, Positions, Shot, Triangles,
+    AovSet, Background, Camera, Faces, Falloff, Filter, Frame, Geometry, Light, Material, MaterialRuns, Mesh,
+    Object, Part, Positions, Shot, Triangles,
 };
 use std::hint::black_box;
 use std::sync::Arc;
@@ -151,7 +151,7 @@ fn shot(camera: Camera, position: Vec3) -> Shot {
         camera,
         lights: vec![Light::Point { position, color: Vec3::ONE, intensity: 1.0, falloff: Falloff::None }],
         ambient: Vec3::splat(0.1),
-        background: Vec3::ZERO,
+        background: Background::Color(Vec3::ZERO),
         size: SIZE,
         samples: 1,
         filter: Filter::Box,

@@ -6,8 +6,8 @@ use rentix::device::{Device, Stop};
 use rentix::math::{DVec3, Vec3};
 use rentix::plan::plan_frame;
 use rentix::scene::{
-    ABSENT, AovSet, Attribute, Camera, Corners, Faces, Falloff, Filter, Frame, Geometry, Light, Material,
-    MaterialRuns, Mesh, Normals, Object, Part, Positions, Shot, Triangles,
+    ABSENT, AovSet, Attribute, Background, Camera, Corners, Faces, Falloff, Filter, Frame, Geometry, Light,
+    Material, MaterialRuns, Mesh, Normals, Object, Part, Positions, Shot, Triangles,
 };
 use std::sync::Arc;
 
@@ -271,7 +271,7 @@ fn shot() -> Shot {
             },
         ],
         ambient: Vec3::new(0.3, 0.2, 0.1),
-        background: Vec3::new(0.1, 0.2, 0.4),
+        background: Background::Color(Vec3::new(0.1, 0.2, 0.4)),
         size: SIZE,
         samples: 1,
         filter: Filter::Box,

@@ -7,8 +7,8 @@ use crate::film::Film;
 use crate::math::{DAffine3, DVec3, Vec3};
 use crate::plan::{Action, plan_frame};
 use crate::scene::{
-    Aov, AovSet, Camera, Faces, Falloff, Filter, Frame, Geometry, Light, Material, MaterialRuns, Mesh,
-    Object, Part, Positions, Shot, Triangles,
+    Aov, AovSet, Background, Camera, Faces, Falloff, Filter, Frame, Geometry, Light, Material, MaterialRuns,
+    Mesh, Object, Part, Positions, Shot, Triangles,
 };
 use std::sync::Arc;
 
@@ -135,8 +135,8 @@ fn what_does_not_fit_is_refused(make: Make) {
 
 fn a_frame_without_objects_is_background(make: Make) {
     let film = picture(&mut *make(AMPLE_BYTES), &Frame::default());
-    let background: [f32; 3] = shot().background.into();
-    assert!(film.rgb.iter().all(|p| *p == background), "an empty frame does not show the background");
+    let Background::Color(color) = shot().background else { panic!("a colour was given") };
+    assert!(film.rgb.iter().all(|p| *p == color.to_array()), "an empty frame does not show the background");
     assert!(film.aovs.id.is_none_or(|ids| ids.iter().all(|id| *id == [u32::MAX; 2])));
 }
 
@@ -195,7 +195,7 @@ pub(super) fn shot() -> Shot {
             },
         ],
         ambient: Vec3::new(0.3, 0.2, 0.1),
-        background: Vec3::new(0.1, 0.2, 0.4),
+        background: Background::Color(Vec3::new(0.1, 0.2, 0.4)),
         size: [75, 43],
         samples: 3,
         filter: Filter::Gaussian,

@@ -4,7 +4,7 @@
 use super::{Device, DeviceError, DeviceInfo, DeviceKind, RayCounts, Stop, Traced, UpdateCost};
 use crate::film::Film;
 use crate::plan::{Residency, Step, UpdatePlan, tree_name};
-use crate::scene::{Frame, Object, PartHash, Shot};
+use crate::scene::{Background, Frame, Object, PartHash, Shot};
 use std::collections::BTreeMap;
 
 /// Bytes that a tree of the fake device takes for each triangle.
@@ -66,11 +66,15 @@ impl FakeDevice {
     }
 }
 
-/// The colour that all pixels of a frame's picture have: the background where there is nothing to be seen, else made
+/// The colour that all pixels of a frame's picture have: the background where there is nothing to be seen (white
+/// for a picture), else made
 /// of the frame's hash.
 pub fn color_of(frame: &Frame, shot: &Shot) -> [f32; 3] {
     if frame.triangles() == 0 {
-        return shot.background.into();
+        return match &shot.background {
+            Background::Color(color) => color.to_array(),
+            Background::Picture(_) => [1.0; 3],
+        };
     }
     let bits = frame.hash().0;
     [0, 8, 16].map(|shift| f32::from((bits >> shift) as u8) / 255.0)

@@ -89,7 +89,7 @@ impl Settings {
     }
 
     /// The shot of a frame with the camera, lights and background that were found for it.
-    pub fn shot(&self, camera: Camera, lights: Vec<Light>, background: Vec3) -> Shot {
+    pub fn shot(&self, camera: Camera, lights: Vec<Light>, background: crate::scene::Background) -> Shot {
         Shot {
             camera,
             lights,

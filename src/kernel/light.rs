@@ -10,6 +10,8 @@ pub const POINT: u32 = 0;
 pub const DIRECTIONAL: u32 = 1;
 /// [`LightRecord::kind`] of a spot.
 pub const SPOT: u32 = 2;
+/// [`LightRecord::kind`] of the triangles that glow.
+pub const AREA: u32 = 3;
 
 /// A light, ready for shading.
 #[repr(C)]
@@ -17,7 +19,7 @@ pub const SPOT: u32 = 2;
 pub struct LightRecord {
     /// Where it stands; of a directional one the unit vector towards it.
     pub place: Vec3,
-    /// [`POINT`], [`DIRECTIONAL`] or [`SPOT`].
+    /// [`POINT`], [`DIRECTIONAL`], [`SPOT`] or [`AREA`].
     pub kind: u32,
     /// Colour × intensity, linear RGB.
     pub radiance: Vec3,
@@ -29,8 +31,10 @@ pub struct LightRecord {
     pub cos_inner: f32,
     /// Cosine of a spot's outer half angle.
     pub cos_outer: f32,
+    /// Points of an area light that each shading point looks at.
+    pub samples: u32,
     /// Fills the row of four.
-    pub pad: [u32; 3],
+    pub pad: [u32; 2],
 }
 
 impl LightRecord {
@@ -60,6 +64,10 @@ impl LightRecord {
                 record.axis = unit(direction);
                 record.cos_inner = cos(inner_deg);
                 record.cos_outer = cos(outer_deg);
+            }
+            Light::Area { samples } => {
+                record.kind = AREA;
+                record.samples = samples.max(1);
             }
         }
         record

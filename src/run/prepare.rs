@@ -6,14 +6,18 @@ use super::source::Sources;
 use crate::format;
 use crate::job::{Background, Job, LightChoice, Picture, Sequence, auto};
 use crate::math::Bounds;
-use crate::scene::{Camera, Light, Object, Shot};
+use crate::scene::{self, Camera, Light, Object, Part, Shot, Texture};
 use crate::warning::Warnings;
 use rayon::prelude::*;
+use std::collections::HashMap;
+use std::path::PathBuf;
 use std::sync::Arc;
 
 /// What was found out of each sequence, by its place in the job.
 pub(super) struct Prepared {
     sequences: Vec<Found>,
+    /// Background pictures, or why there is none.
+    backgrounds: HashMap<PathBuf, Result<Part<Texture>, String>>,
     pub(super) sources: Sources,
     pub(super) warnings: Warnings,
 }
@@ -28,6 +32,7 @@ struct Found {
 pub(super) fn prepare(job: &Job, options: &RunOptions) -> Prepared {
     let mut prepared = Prepared {
         sequences: job.sequences.iter().map(|_| Found::default()).collect(),
+        backgrounds: backgrounds(job),
         sources: Sources::default(),
         warnings: job.warnings.clone(),
     };
@@ -59,12 +64,11 @@ impl Prepared {
             LightChoice::Auto => self.sequences[picture.sequence].light.into_iter().collect(),
         };
         let background = match &picture.settings.background {
-            Background::Color(color) => *color,
+            Background::Color(color) => scene::Background::Color(*color),
             Background::File(path) => {
-                return Err(format!(
-                    "{}: background pictures are not rendered by this version; give a colour",
-                    path.display()
-                ));
+                let read =
+                    self.backgrounds.get(path).ok_or_else(|| format!("{}: was not read", path.display()))?;
+                scene::Background::Picture(read.clone()?)
             }
         };
         Ok(picture.settings.shot(self.camera(picture), lights, background))
@@ -77,6 +81,18 @@ impl Prepared {
             .camera_at(picture.frame)
             .unwrap_or_else(|| auto::camera(&bounds(), &picture.settings))
     }
+}
+
+/// The background pictures of a job, each read once.
+fn backgrounds(job: &Job) -> HashMap<PathBuf, Result<Part<Texture>, String>> {
+    let mut read = HashMap::new();
+    for picture in &job.pictures {
+        if let Background::File(path) = &picture.settings.background {
+            let load = || format::load_picture(path).map_err(|e| format!("{e}; the frame is not rendered"));
+            read.entry(path.clone()).or_insert_with(load);
+        }
+    }
+    read
 }
 
 /// The box of a sequence's layers over the frames that are looked at; files are scanned on all cores. What cannot be

@@ -9,7 +9,6 @@ use crate::device::Stop;
 use crate::diff::Change;
 use crate::format::{Loaded, ReadOptions};
 use crate::job::{Job, Picture, Settings};
-use crate::kernel;
 use crate::output::{Bits, Encoding, Format, Records};
 use crate::scene::{Frame, Object, PartHash, PartHasher, Shot};
 use crate::warning::Warnings;
@@ -20,7 +19,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::mpsc::Sender;
 
 /// Changes whenever the same inputs may give other pixels, so that pictures of other versions are made anew.
-const PICTURE_VERSION: u64 = 1;
+const PICTURE_VERSION: u64 = 2;
 
 /// A frame that was read and must be traced.
 pub(super) struct ReadFrame {
@@ -208,18 +207,9 @@ pub fn read_frame(
     load_frame(job, picture, sources, lenient, false, warnings).map(|l| l.frame)
 }
 
-/// Names what of the materials is not rendered as it says, and frames that nothing can be seen of.
+/// Names frames that nothing can be seen of.
 fn warn_of_materials(path: &Path, loaded: &Loaded, warnings: &mut Warnings) {
     let g = &loaded.geometry;
-    for m in &g.materials {
-        if let Some(other) = kernel::fallback(m.illum) {
-            warnings.add(
-                None,
-                None,
-                format!("illum {} is rendered as illum {other} by this version", m.illum),
-            );
-        }
-    }
     let has_faces = !g.triangles.0.is_empty();
     let is_seen = |run: &[u32; 2]| g.materials.get(run[1] as usize).is_none_or(|m| m.d > 0.0);
     if has_faces && !g.material_runs.0.iter().any(is_seen) {

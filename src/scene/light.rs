@@ -53,6 +53,11 @@ pub enum Light {
         /// How it weakens.
         falloff: Falloff,
     },
+    /// Every triangle of the frame with Ke.
+    Area {
+        /// Points that each shading point looks at, 1 or more.
+        samples: u32,
+    },
 }
 
 impl Light {
@@ -62,6 +67,7 @@ impl Light {
             Self::Point { falloff, .. } => (0, *falloff),
             Self::Directional { .. } => (1, Falloff::None),
             Self::Spot { falloff, .. } => (2, *falloff),
+            Self::Area { .. } => (3, Falloff::None),
         };
         h.u64(kind | u64::from(falloff == Falloff::InverseSquare) << 8);
         match *self {
@@ -77,6 +83,7 @@ impl Light {
                 h.slice(&[position, direction, color]);
                 h.slice(&[inner_deg, outer_deg, intensity]);
             }
+            Self::Area { samples } => h.u64(u64::from(samples)),
         }
     }
 }

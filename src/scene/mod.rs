@@ -19,5 +19,5 @@ pub use geometry::{
 pub use light::{Falloff, Light};
 pub use material::{Material, Textures};
 pub use part::{Content, Part, PartHash, PartHasher};
-pub use shot::{Aov, AovSet, Filter, Shot};
+pub use shot::{Aov, AovSet, Background, Filter, Shot};
 pub use texture::{Channel, Map, Reflection, TexelSpace, Texels, Texture};

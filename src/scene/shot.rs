@@ -2,7 +2,8 @@
 
 use super::camera::Camera;
 use super::light::Light;
-use super::part::PartHasher;
+use super::part::{Part, PartHasher};
+use super::texture::Texture;
 use crate::math::Vec3;
 
 /// The pixel filter, sampled, not splatted.
@@ -32,11 +33,26 @@ pub enum Aov {
     Albedo,
     /// `id.part` and `id.triangle`.
     Id,
+    /// The material, by its place among the frame's distinct ones in the order of their first use.
+    Material,
+    /// Texture coordinates.
+    Uv,
+    /// What is not background, mean over the samples.
+    Coverage,
 }
 
 impl Aov {
     /// All of them, in the order in which they are written.
-    pub const ALL: [Self; 5] = [Self::Depth, Self::Normal, Self::Position, Self::Albedo, Self::Id];
+    pub const ALL: [Self; 8] = [
+        Self::Depth,
+        Self::Normal,
+        Self::Position,
+        Self::Albedo,
+        Self::Id,
+        Self::Material,
+        Self::Uv,
+        Self::Coverage,
+    ];
 
     /// The word on the command line and in the job file.
     pub fn word(self) -> &'static str {
@@ -46,6 +62,9 @@ impl Aov {
             Self::Position => "position",
             Self::Albedo => "albedo",
             Self::Id => "id",
+            Self::Material => "material",
+            Self::Uv => "uv",
+            Self::Coverage => "coverage",
         }
     }
 }
@@ -71,6 +90,30 @@ impl AovSet {
     }
 }
 
+/// What is seen where nothing is hit.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Background {
+    /// A colour, linear RGB.
+    Color(Vec3),
+    /// A latitude-longitude picture: −z in its middle, +x to the right of it, +y at the top.
+    Picture(Part<Texture>),
+}
+
+impl Background {
+    fn hash_into(&self, h: &mut PartHasher) {
+        match self {
+            Self::Color(color) => {
+                h.u64(0);
+                h.slice(&[*color]);
+            }
+            Self::Picture(texture) => {
+                h.u64(1);
+                h.part(texture.hash());
+            }
+        }
+    }
+}
+
 /// Everything but the geometry that bears on the film of one frame.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Shot {
@@ -80,8 +123,8 @@ pub struct Shot {
     pub lights: Vec<Light>,
     /// Ambient light Ia, linear RGB.
     pub ambient: Vec3,
-    /// What is seen where nothing is hit, linear RGB.
-    pub background: Vec3,
+    /// What is seen where nothing is hit.
+    pub background: Background,
     /// Width and height in pixels, each 1 or more.
     pub size: [u32; 2],
     /// Samples a pixel, 1 or more.
@@ -108,7 +151,8 @@ impl Shot {
         for l in &self.lights {
             l.hash_into(h);
         }
-        h.slice(&[self.ambient, self.background]);
+        h.slice(&[self.ambient]);
+        self.background.hash_into(h);
         h.slice(&self.size);
         h.slice(&[self.samples, self.filter as u32, self.depth, self.seed]);
         h.f32(self.prune);

@@ -303,9 +303,12 @@ fn light(l: schema::Light) -> Result<Light, Wrong> {
                 falloff: falloff(s.falloff),
             })
         }
-        (None, None, None, Some(_)) => {
-            Err(("lights", "area lights are not supported by this version".to_string()))
-        }
+        (None, None, None, Some(a)) => match a.material {
+            Some(m) if m.0 != "all" => {
+                Err(("lights", format!("an area light is of material `all`, not `{}`", m.0)))
+            }
+            _ => Ok(Light::Area { samples: a.samples.map_or(1, |n| n.0 as u32) }),
+        },
         _ => Err(("lights", "each light is one of point, directional, spot, area".to_string())),
     }
 }

@@ -156,7 +156,15 @@ pub(super) struct Light {
     pub point: Option<Point>,
     pub directional: Option<Directional>,
     pub spot: Option<Spot>,
-    pub area: Option<de::IgnoredAny>,
+    pub area: Option<Area>,
+}
+
+/// Every triangle that glows.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Area {
+    pub material: Option<Word>,
+    pub samples: Option<Number<Samples>>,
 }
 
 #[derive(Clone, Copy, Deserialize, Default)]
