@@ -3,16 +3,18 @@
 //!
 //! `cargo run --example make_inchworm` writes the files; with `-- --check` it tells whether those there are the same.
 
+use std::collections::{BTreeMap, BTreeSet};
 use std::f64::consts::{PI, TAU};
 use std::fmt::Write as _;
 use std::path::Path;
 use std::process::ExitCode;
+use std::{fs, io};
 
 const FRAMES: u32 = 36;
 /// How far one cycle of the gait brings it.
 const STRIDE: f64 = 1.1;
 const LENGTH: f64 = 3.4;
-const RINGS: usize = 44;
+const RINGS: usize = 40;
 const SECTORS: usize = 16;
 
 const MTL: &str = "\
@@ -129,12 +131,13 @@ impl Obj {
         self.tube(&rings, |_| material);
     }
 
-    fn ball(&mut self, c: [f64; 3], r: f64, rings: usize, material: &'static str) {
+    fn ball(&mut self, c: [f64; 3], r: f64, sectors: usize, material: &'static str) {
+        let rings = sectors / 2;
         let profile: Vec<[f64; 2]> = (0..=rings)
             .map(|i| PI * (0.04 + 0.92 * i as f64 / rings as f64))
             .map(|a| [r * a.sin(), c[1] - r * a.cos()])
             .collect();
-        self.lathe([c[0], c[2]], &profile, 14, material);
+        self.lathe([c[0], c[2]], &profile, sectors, material);
     }
 
     fn stone(&mut self, c: [f64; 3], half: [f64; 3]) {
@@ -162,14 +165,20 @@ fn gait(phase: f64) -> (f64, f64, f64) {
     (tail, head, hump)
 }
 
+/// The height of the ground.
+fn ground(x: f64, z: f64) -> f64 {
+    0.06 * (1.3 * x).sin() * (1.7 * z).cos() - 0.06
+}
+
 fn worm(obj: &mut Obj, frame: u32) {
     let cycle = 2.0 * f64::from(frame) / f64::from(FRAMES);
     let (tail, head, hump) = gait(cycle.fract());
     let start = -3.2 + STRIDE * cycle.floor();
     let spine = |s: f64| {
         let s = s.clamp(0.0, 1.0);
+        let (x, z) = (start + tail + (head - tail) * s, 0.12 * (TAU * s).sin());
         let lift = 0.25 * (8.0 * (s - 0.86)).clamp(0.0, 1.0);
-        [start + tail + (head - tail) * s, 0.3 + hump * (PI * s).sin().powi(2) + lift, 0.12 * (TAU * s).sin()]
+        [x, ground(x, z) + 0.27 + hump * (PI * s).sin().powi(2) + lift, z]
     };
     let rings: Vec<Vec<[f64; 3]>> = (0..RINGS)
         .map(|i| {
@@ -193,19 +202,18 @@ fn worm(obj: &mut Obj, frame: u32) {
     let face = spine(1.0);
     obj.object(&format!("Eyes.{frame:03}"));
     for side in [-1.0, 1.0] {
-        obj.ball([face[0] - 0.02, face[1] + 0.2, side * 0.17], 0.13, 8, "Eye");
-        obj.ball([face[0] + 0.07, face[1] + 0.22, side * 0.19], 0.07, 6, "Pupil");
+        obj.ball([face[0] - 0.02, face[1] + 0.2, side * 0.17], 0.13, 12, "Eye");
+        obj.ball([face[0] + 0.07, face[1] + 0.22, side * 0.19], 0.07, 8, "Pupil");
     }
 }
 
 fn garden(obj: &mut Obj, frame: u32) {
     obj.object(&format!("Ground.{frame:03}"));
-    let height = |x: f64, z: f64| 0.06 * (1.3 * x).sin() * (1.7 * z).cos() - 0.06;
     let n = 12;
     let at = |i: usize| -7.0 + 14.0 * i as f64 / n as f64;
     let v: Vec<usize> = (0..=n)
         .flat_map(|i| (0..=n).map(move |j| (at(i), at(j))))
-        .map(|(x, z)| obj.vertex([x, height(x, z), z]))
+        .map(|(x, z)| obj.vertex([x, ground(x, z), z]))
         .collect();
     for material in 0..2 {
         obj.material(["Soil", "Moss"][material], true);
@@ -218,27 +226,23 @@ fn garden(obj: &mut Obj, frame: u32) {
     }
     obj.object(&format!("Garden.{frame:03}"));
     for (x, z, size) in [(-1.2, -2.2, 1.0), (0.3, -2.9, 0.65), (3.4, -1.7, 0.8)] {
-        let stem: Vec<[f64; 2]> = (0..=5)
-            .map(|i| f64::from(i) / 5.0)
-            .map(|t| [size * (0.2 - 0.06 * t), size * 1.5 * t - 0.1])
-            .collect();
-        obj.lathe([x, z], &stem, 12, "Stem");
-        let cap: Vec<[f64; 2]> = (0..=7)
-            .map(|i| 0.5 * PI * f64::from(i) / 7.0)
+        obj.lathe([x, z], &[[size * 0.2, -0.1], [size * 0.14, size * 1.5 - 0.1]], 10, "Stem");
+        let cap: Vec<[f64; 2]> = (0..=6)
+            .map(|i| 0.5 * PI * f64::from(i) / 6.0)
             .map(|a| [size * 0.85 * a.cos().max(0.04), size * (1.3 + 0.55 * a.sin())])
             .collect();
-        obj.lathe([x, z], &cap, 18, "Cap");
+        obj.lathe([x, z], &cap, 16, "Cap");
     }
     obj.stone([2.2, 0.16, 1.7], [0.4, 0.25, 0.3]);
     obj.stone([-3.6, 0.2, -1.2], [0.5, 0.3, 0.45]);
     obj.stone([4.7, 0.1, 0.9], [0.25, 0.18, 0.3]);
     for (x, z, r) in [(-0.4, 1.5, 0.3), (0.35, 1.85, 0.16), (3.3, 1.3, 0.22)] {
-        obj.ball([x, 0.8 * r, z], r, 9, "Dew");
+        obj.ball([x, 0.8 * r, z], r, 12, "Dew");
     }
 }
 
-/// All files by name.
-fn files() -> Vec<(String, String)> {
+/// All files, name and text.
+pub(crate) fn files() -> Vec<(String, String)> {
     let mut files = vec![("inchworm.mtl".to_string(), MTL.to_string())];
     for frame in 1..=FRAMES {
         let mut obj = Obj::default();
@@ -250,24 +254,33 @@ fn files() -> Vec<(String, String)> {
     files
 }
 
-fn main() -> ExitCode {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("sequences/inchworm");
-    let check = std::env::args().any(|a| a == "--check");
-    for (name, text) in files() {
-        let path = folder.join(&name);
-        let done = if check {
-            std::fs::read_to_string(&path).is_ok_and(|there| there == text)
-        } else {
-            std::fs::create_dir_all(&folder).and_then(|()| std::fs::write(&path, text)).is_ok()
-        };
-        if !done {
-            eprintln!(
-                "{} {}",
-                path.display(),
-                if check { "is not what this program makes" } else { "cannot be written" }
-            );
-            return ExitCode::FAILURE;
+/// The files of a folder that are not what is made, and those that are too many.
+pub(crate) fn differences(folder: &Path) -> io::Result<BTreeSet<String>> {
+    let made: BTreeMap<String, String> = files().into_iter().collect();
+    let mut different = BTreeSet::new();
+    for entry in fs::read_dir(folder)? {
+        let name = entry?.file_name().to_string_lossy().into_owned();
+        if !made.contains_key(&name) {
+            different.insert(name);
         }
     }
-    ExitCode::SUCCESS
+    let is_made = |name: &str, text: &String| fs::read_to_string(folder.join(name)).is_ok_and(|t| t == *text);
+    different.extend(made.iter().filter(|(name, text)| !is_made(name, text)).map(|(name, _)| name.clone()));
+    Ok(different)
+}
+
+fn main() -> io::Result<ExitCode> {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("sequences/inchworm");
+    if std::env::args().any(|a| a == "--check") {
+        let different = differences(&folder)?;
+        for name in &different {
+            eprintln!("{}: not what this program makes", folder.join(name).display());
+        }
+        return Ok(if different.is_empty() { ExitCode::SUCCESS } else { ExitCode::FAILURE });
+    }
+    fs::create_dir_all(&folder)?;
+    for (name, text) in files() {
+        fs::write(folder.join(name), text)?;
+    }
+    Ok(ExitCode::SUCCESS)
 }

@@ -15,7 +15,7 @@
 //! | [`output`] | encoders, atomic files, the records of finished frames |
 //! | [`film`] | film, AOVs, colour, comparison |
 //! | [`job`] | what is to be rendered: job file, discovery, cameras and transforms over time |
-//! | [`format`] | bytes to values with diagnostics: OBJ, MTL |
+//! | [`mod@format`] | bytes to values with diagnostics: OBJ, MTL, textures |
 //! | [`store`] | the cache on disk; knows bytes, not scenes |
 //! | [`scene`] | frames, parts, meshes, materials, lights, cameras: plain data |
 //! | [`math`], [`clock`], [`warning`] | the ground floor |

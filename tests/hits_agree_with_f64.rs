@@ -44,15 +44,15 @@ const CONFERENCE: (&str, Vec3, Vec3) =
 #[test]
 fn small_pictures_of_scenes() {
     for (path, eye, look_at) in [BUNNY, SIBENIK, CONFERENCE] {
-        pictures(path, eye, look_at, [24, 14]);
+        pictures(path, eye, look_at, [18, 10]);
     }
 }
 
 #[test]
-#[ignore = "a minute; RENTIX_SCENES=… cargo test --release --test hits_agree_with_f64 -- --ignored"]
+#[ignore = "one to three minutes; RENTIX_SCENES=… cargo test --release --test hits_agree_with_f64 -- --ignored"]
 fn larger_pictures_of_scenes() {
     for (path, eye, look_at) in [BUNNY, SIBENIK, CONFERENCE] {
-        pictures(path, eye, look_at, [160, 90]);
+        pictures(path, eye, look_at, [96, 54]);
     }
 }
 

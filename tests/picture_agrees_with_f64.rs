@@ -11,6 +11,7 @@ use rentix::scene::{
 };
 use std::sync::Arc;
 
+const BACKGROUND: Vec3 = Vec3::new(0.1, 0.2, 0.4);
 const TRIANGLES: u32 = 24;
 const SIZE: [u32; 2] = [96, 54];
 
@@ -162,6 +163,7 @@ fn arriving(light: &Light, p: DVec3) -> (DVec3, f64, DVec3) {
             let share = smoothstep(outer, inner, -(to / d).dot(direction.as_dvec3().normalize()));
             (to / d, d, color.as_dvec3() * f64::from(intensity) * weaken(falloff, d) * share)
         }
+        Light::Area { .. } => unreachable!("no light of this test"),
     }
 }
 
@@ -234,7 +236,7 @@ fn pixel(patches: &[Patch], shot: &Shot, x: u32, y: u32) -> (DVec3, f64) {
             break;
         }
     }
-    (sum + through * shot.background.as_dvec3(), margin.0)
+    (sum + through * BACKGROUND.as_dvec3(), margin.0)
 }
 
 fn shot() -> Shot {
@@ -271,7 +273,7 @@ fn shot() -> Shot {
             },
         ],
         ambient: Vec3::new(0.3, 0.2, 0.1),
-        background: Background::Color(Vec3::new(0.1, 0.2, 0.4)),
+        background: Background::Color(BACKGROUND),
         size: SIZE,
         samples: 1,
         filter: Filter::Box,

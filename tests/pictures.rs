@@ -8,7 +8,7 @@ use rentix::scene::{Aov, AovSet, PartHasher};
 use std::path::Path;
 use std::process::Command;
 
-const PNG8: Encoding = Encoding { format: Format::Png, bits: Bits::Eight, exposure_stops: 0.0 };
+const PNG8: Encoding = Encoding { format: Format::Png, bits: Bits::Eight, exposure_stops: 0.0, quality: 92 };
 const PNG16: Encoding = Encoding { bits: Bits::Sixteen, ..PNG8 };
 const PPM8: Encoding = Encoding { format: Format::Ppm, ..PNG8 };
 const PPM16: Encoding = Encoding { bits: Bits::Sixteen, ..PPM8 };

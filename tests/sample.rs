@@ -2,7 +2,18 @@
 
 mod common;
 
+#[path = "../examples/make_inchworm.rs"]
+#[allow(dead_code, reason = "its main belongs to the example")]
+mod make_inchworm;
+
 use std::path::Path;
+
+#[test]
+fn the_sample_is_what_its_program_makes() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("sequences/inchworm");
+    let different = make_inchworm::differences(&folder).unwrap();
+    assert!(different.is_empty(), "cargo run --example make_inchworm makes anew: {different:?}");
+}
 
 #[test]
 fn the_sample_renders() {

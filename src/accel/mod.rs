@@ -30,7 +30,7 @@ mod validate;
 pub use binary::Quality;
 pub use brute::BruteForce;
 pub use lanes::Width;
-pub use origin::{hit_point, magnitude, offset_origin};
+pub use origin::{extent, hit_point, magnitude, offset_origin};
 pub use placement::Placement;
 pub use slab::Aabb;
 pub use traced::{TracedObject, TracedScene};

@@ -12,10 +12,19 @@ pub fn hit_point(corners: &[Vec3; 3], barycentric: [f32; 2]) -> Vec3 {
     corners[0] * (1.0 - u - v) + corners[1] * u + corners[2] * v
 }
 
-/// The largest |x|, |y|, |z| of a triangle's corners: the magnitude that [`offset_origin`] wants for an object without
-/// a transform. For a placed one it is the largest of [`super::Placement::magnitude`].
+/// The largest |x|, |y|, |z| of a triangle's corners, each with the triangle's [`extent`]: the magnitude that
+/// [`offset_origin`] wants for an object without a transform. For a placed one it is the largest of
+/// [`super::Placement::magnitude`], with the extent likewise.
 pub fn magnitude(corners: &[Vec3; 3]) -> Vec3 {
-    corners[0].abs().max(corners[1].abs()).max(corners[2].abs())
+    corners[0].abs().max(corners[1].abs()).max(corners[2].abs()) + extent(corners)
+}
+
+/// A triangle's largest extent along an axis. The edge test works with corners relative to the ray's origin and mixes
+/// the axes, so a ray that starts on the triangle may meet it again at some ULP of this, whatever the normal: a floor
+/// at y = 1e-8 needs it, whose corners and points say that y is known to 1e-15.
+pub fn extent(corners: &[Vec3; 3]) -> f32 {
+    let [a, b, c] = *corners;
+    (a.max(b).max(c) - a.min(b).min(c)).max_element()
 }
 
 /// Moves the point p of a hit off its triangle to the side that the unit normal n points to, by
@@ -40,6 +49,7 @@ mod tests {
     fn a_hit_point_is_the_combination_of_the_corners() {
         let corners = [Vec3::ZERO, Vec3::new(4.0, 0.0, 8.0), Vec3::new(0.0, 2.0, -8.0)];
         assert_eq!(hit_point(&corners, [0.25, 0.5]), Vec3::new(1.0, 1.0, -2.0));
-        assert_eq!(magnitude(&corners), Vec3::new(4.0, 2.0, 8.0));
+        assert_eq!(extent(&corners), 16.0);
+        assert_eq!(magnitude(&corners), Vec3::new(20.0, 18.0, 24.0));
     }
 }

@@ -19,11 +19,10 @@ pub(super) fn devices(global: &Global) -> Result<ExitCode> {
         println!("{line}");
     } else {
         eprintln!(
-            "{}  {}  {}, {} threads, may hold {:.1} GiB (half of the free memory; --device-memory changes it)",
+            "{}  {}  {}, may hold {:.1} GiB (half of the free memory; --device-memory changes it)",
             info.name,
             machine::machine().cpu,
             info.description,
-            info.threads,
             info.budget_bytes as f64 / f64::from(1 << 30)
         );
     }

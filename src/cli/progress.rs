@@ -2,7 +2,9 @@
 
 use crate::clock::Stopwatch;
 use crate::run::{Event, FrameReport, Status};
+use crate::warning::Warning;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use std::collections::BTreeMap;
 use std::io::IsTerminal;
 use std::time::Duration;
 
@@ -32,9 +34,13 @@ pub(super) struct Progress {
     frames: usize,
     ended: usize,
     failed: usize,
+    /// For how many files each warning came.
+    warned: BTreeMap<String, usize>,
 }
 
 const PLAIN_EVERY_S: f64 = 5.0;
+/// For so many files one cause of warnings is told.
+const FILES_TOLD: usize = 3;
 
 impl Progress {
     /// Progress of the given kind.
@@ -62,6 +68,7 @@ impl Progress {
             frames: 0,
             ended: 0,
             failed: 0,
+            warned: BTreeMap::new(),
         }
     }
 
@@ -75,7 +82,16 @@ impl Progress {
                 }
             }
             Event::Frame(frame) => self.frame(frame),
-            Event::Warning(w) => self.line(&format!("warning: {w}")),
+            Event::Warning(w) => self.warning(w),
+        }
+    }
+
+    /// Shows a cause for a few files and counts the others; the report has them all.
+    fn warning(&mut self, warning: &Warning) {
+        let files = self.warned.entry(warning.text.clone()).or_default();
+        *files += 1;
+        if *files <= FILES_TOLD || self.verbose {
+            self.line(&format!("warning: {warning}"));
         }
     }
 
@@ -123,10 +139,13 @@ impl Progress {
         }
     }
 
-    /// Takes the bar away.
+    /// Takes the bar away and tells what was counted.
     pub(super) fn end(&self) {
         if let Some(bar) = &self.bar {
             bar.finish_and_clear();
+        }
+        for (text, files) in self.warned.iter().filter(|(_, files)| **files > FILES_TOLD && !self.verbose) {
+            eprintln!("warning: the same for {} more files: {text}", files - FILES_TOLD);
         }
     }
 }

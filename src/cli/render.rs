@@ -5,7 +5,7 @@ use super::render_args::RenderArgs;
 use super::{EXIT_FAILED, EXIT_NO_DEVICE, Global, request, stop};
 use crate::device::Device;
 use crate::device::cpu::CpuDevice;
-use crate::job::{self, Job};
+use crate::job::{self, FrameSet, Job};
 use crate::run::{self, Event, FrameReport, Outcome, RunOptions, machine};
 use anyhow::{Result, bail};
 use std::fmt::Write as _;
@@ -119,8 +119,7 @@ fn frame_list(failed: &[&FrameReport]) -> String {
     numbers.dedup();
     let mut text = String::new();
     if !numbers.is_empty() {
-        let list: Vec<String> = numbers.iter().map(ToString::to_string).collect();
-        let _ = write!(text, "--frames {}", list.join(","));
+        let _ = write!(text, "--frames {}", FrameSet::from_numbers(&numbers));
     }
     for f in failed.iter().filter(|f| f.frame.is_none()) {
         let _ = write!(text, "{}{}", if text.is_empty() { "" } else { " and " }, f.source);

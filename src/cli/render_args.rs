@@ -19,7 +19,7 @@ pub(super) struct RenderArgs {
     /// Width and height: 640x360, hd (1280x720) or fullhd (1920x1080) [default: hd]
     #[arg(long, value_parser = size::pixels, value_name = "SIZE", help_heading = "Output")]
     pub size: Option<[u32; 2]>,
-    /// Picture format: png, exr, ppm [default: png]
+    /// Picture format: png exr ppm pgm pbm jpg bmp tif jp2 ras tga webp qoi hdr … [default: png]
     #[arg(long, value_name = "EXT", help_heading = "Output")]
     pub format: Option<String>,
     /// Name of a picture: {stem}, {name}, {frame}, {frame:04} [default: {stem}; layers: {name}_{frame:04}]

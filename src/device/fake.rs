@@ -66,14 +66,13 @@ impl FakeDevice {
     }
 }
 
-/// The colour that all pixels of a frame's picture have: the background where there is nothing to be seen (white
-/// for a picture), else made
+/// The colour that all pixels of a frame's picture have: the background where there is nothing to be seen, else made
 /// of the frame's hash.
 pub fn color_of(frame: &Frame, shot: &Shot) -> [f32; 3] {
     if frame.triangles() == 0 {
-        return match &shot.background {
-            Background::Color(color) => color.to_array(),
-            Background::Picture(_) => [1.0; 3],
+        return match shot.background {
+            Background::Color(color) => color.into(),
+            Background::Picture(_) => [0.5; 3],
         };
     }
     let bits = frame.hash().0;

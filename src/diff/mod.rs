@@ -149,7 +149,11 @@ impl AttributeValues for Texcoords {
 fn material_changes(a: &[Part<Material>], b: &[Part<Material>], change: &mut Change) {
     for i in 0..a.len().max(b.len()) {
         match (a.get(i), b.get(i)) {
-            (Some(a), Some(b)) => change.materials += u32::from(a != b && !same_but_for_textures(a, b)),
+            (Some(a), Some(b)) => {
+                // what differs in textures alone is counted there, unless they only changed places
+                let counted = change.textures > 0 && same_but_for_textures(a, b);
+                change.materials += u32::from(a != b && !counted);
+            }
             (Some(_), None) | (None, Some(_)) => change.materials += 1,
             (None, None) => {}
         }

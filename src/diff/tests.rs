@@ -1,5 +1,5 @@
 use super::*;
-use crate::scene::{ABSENT, Corners, Faces, MaterialRuns, Positions, Triangles};
+use crate::scene::{ABSENT, Corners, Faces, MaterialRuns, Positions, TexelSpace, Texels, Texture, Triangles};
 use std::sync::Arc;
 
 /// Two meshes of one triangle each over six positions, with normals.
@@ -59,4 +59,49 @@ fn a_colour_is_a_material_and_a_transform_is_rigid() {
     let mut moved = rest();
     moved.objects[0].transform = Some(crate::math::DAffine3::from_translation(glam::DVec3::X));
     assert_eq!(changes(Some(&rest()), &moved), Change { rigid: 2, ..Change::default() });
+}
+
+/// The frame at rest whose material has those maps: of Kd, and of bump with a factor.
+fn textured(kd: Option<u8>, bump: Option<(u8, f32)>) -> Frame {
+    let map = |texel: u8, bump_multiplier: f32| Map {
+        texture: Part::new(Texture {
+            size: [1, 1],
+            space: TexelSpace::Linear,
+            alpha_varies: false,
+            texels: Texels::U8(vec![[texel; 4]]),
+        }),
+        scale: [1.0; 2],
+        offset: [0.0; 2],
+        clamp: false,
+        base_gain: [0.0, 1.0],
+        bump_multiplier,
+        channel: None,
+    };
+    let textures = Textures {
+        map_kd: kd.map(|texel| map(texel, 1.0)),
+        bump: bump.map(|(texel, factor)| map(texel, factor)),
+        ..Textures::default()
+    };
+    let mut frame = rest();
+    let mut geometry = Geometry::clone(&frame.objects[0].geometry);
+    geometry.materials = vec![Part::new(Material { textures, ..Material::clone(&geometry.materials[0]) })];
+    frame.objects[0].geometry = Arc::new(geometry);
+    frame
+}
+
+#[test]
+fn textures_are_counted_apart_from_the_materials_that_use_them() {
+    let counts = |before: &Frame, after: &Frame| {
+        let change = changes(Some(before), after);
+        (change.textures, change.materials)
+    };
+    let before = textured(Some(1), Some((2, 1.0)));
+    assert_eq!(counts(&before, &before), (0, 0));
+    assert_eq!(counts(&before, &textured(Some(3), Some((2, 1.0)))), (1, 0), "another content");
+    assert_eq!(counts(&before, &textured(Some(3), Some((4, 1.0)))), (2, 0));
+    assert_eq!(counts(&before, &textured(Some(1), None)), (1, 0), "it went");
+    assert_eq!(counts(&textured(None, None), &before), (2, 0), "they came");
+    assert_eq!(counts(&before, &textured(Some(1), Some((2, 0.5)))), (0, 1), "used otherwise");
+    assert_eq!(counts(&before, &textured(Some(2), Some((1, 1.0)))), (0, 1), "both are still there");
+    assert_eq!(changes(None, &before).textures, 2);
 }

@@ -149,7 +149,9 @@ impl<'a> Loader<'a> {
         let whole = [statement.to_vec(), unescaped(statement)];
         let mut found =
             whole.into_iter().filter(|name| self.lookup.find(name, &[folder(self.obj)]).is_some());
-        found.next().map_or_else(|| split_escaped(statement), |name| vec![name])
+        found
+            .next()
+            .map_or_else(|| split_escaped(statement).take(MAX_LIBRARIES + 1).collect(), |name| vec![name])
     }
 
     /// Reads one library; else what to say.
@@ -302,18 +304,14 @@ fn folder(file: &Path) -> &Path {
 }
 
 /// Names between blanks; `\ ` is a blank within a name.
-fn split_escaped(statement: &[u8]) -> Vec<Vec<u8>> {
-    let borders =
-        (0..statement.len()).filter(|&i| is_blank(statement[i]) && (i == 0 || statement[i - 1] != b'\\'));
-    let mut names = Vec::new();
-    let mut start = 0;
-    for end in borders.chain([statement.len()]) {
-        if start < end {
-            names.push(unescaped(&statement[start..end]));
-        }
-        start = end + 1;
-    }
-    names
+fn split_escaped(statement: &[u8]) -> impl Iterator<Item = Vec<u8>> {
+    let mut escapes = false;
+    let words = statement.split(move |&byte| {
+        let parts = is_blank(byte) && !escapes;
+        escapes = byte == b'\\';
+        parts
+    });
+    words.filter(|word| !word.is_empty()).map(unescaped)
 }
 
 fn unescaped(name: &[u8]) -> Vec<u8> {
@@ -328,7 +326,7 @@ mod tests {
     #[test]
     fn names_of_libraries() {
         let names = |statement: &str| -> Vec<String> {
-            split_escaped(statement.as_bytes()).into_iter().map(|n| String::from_utf8(n).unwrap()).collect()
+            split_escaped(statement.as_bytes()).map(|n| String::from_utf8(n).unwrap()).collect()
         };
         assert_eq!(names("a.mtl b\\ c.mtl  d.mtl"), ["a.mtl", "b c.mtl", "d.mtl"]);
         assert_eq!(names(r"maps\a.mtl"), [r"maps\a.mtl"]);

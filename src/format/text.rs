@@ -258,11 +258,13 @@ impl Tally {
     }
 }
 
-/// Bytes for people to read, the first of them where they are many.
+/// Bytes for people to read, the first of them where they are many. What would steer a terminal is not shown.
 pub(super) fn shown(bytes: &[u8]) -> String {
     const MANY: usize = 100;
     let first = String::from_utf8_lossy(&bytes[..bytes.len().min(MANY)]);
-    if bytes.len() > MANY { format!("{first}…") } else { first.into_owned() }
+    let first: String =
+        first.chars().map(|c| if c.is_control() { char::REPLACEMENT_CHARACTER } else { c }).collect();
+    if bytes.len() > MANY { format!("{first}…") } else { first }
 }
 
 #[cfg(test)]

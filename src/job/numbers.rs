@@ -1,5 +1,6 @@
 //! Frame numbers as they are typed: `--frames`, `--chunk`, `--order`.
 
+use std::fmt;
 use std::ops::Range;
 use std::str::FromStr;
 
@@ -16,6 +17,18 @@ struct Run {
 }
 
 impl FrameSet {
+    /// The set of these numbers, ascending, in runs as long as may be.
+    pub fn from_numbers(numbers: &[i64]) -> Self {
+        let mut runs: Vec<Run> = Vec::new();
+        for &n in numbers {
+            match runs.last_mut() {
+                Some(run) if run.last + 1 == n => run.last = n,
+                _ => runs.push(Run { first: n, last: n, step: 1 }),
+            }
+        }
+        Self(runs)
+    }
+
     /// Whether a number is in it.
     pub fn contains(&self, number: i64) -> bool {
         self.0.iter().any(|r| (r.first..=r.last).contains(&number) && (number - r.first) % r.step == 0)
@@ -49,6 +62,22 @@ impl FrameSet {
             (at <= r.last).then_some(at)
         };
         self.0.iter().filter_map(missing).min()
+    }
+}
+
+impl fmt::Display for FrameSet {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        for (i, run) in self.0.iter().enumerate() {
+            let comma = if i == 0 { "" } else { "," };
+            write!(f, "{comma}{}", run.first)?;
+            if run.last > run.first {
+                write!(f, "-{}", run.last)?;
+            }
+            if run.step > 1 {
+                write!(f, "x{}", run.step)?;
+            }
+        }
+        Ok(())
     }
 }
 
@@ -176,6 +205,12 @@ mod tests {
         for bad in ["", "a", "1-", "5-1", "1-9x0", "1,,2", "1-9x-2", "99999999999999999999"] {
             assert!(bad.parse::<FrameSet>().is_err(), "{bad}");
         }
+    }
+
+    #[test]
+    fn sets_are_shown_as_they_are_typed() {
+        assert_eq!(FrameSet::from_numbers(&[-2, 1, 2, 3, 7]).to_string(), "-2,1-3,7");
+        assert_eq!("1-9:2,12".parse::<FrameSet>().unwrap().to_string(), "1-9x2,12");
     }
 
     #[test]

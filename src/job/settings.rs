@@ -4,10 +4,18 @@ use super::options::{Background, CameraChoice, LightChoice, Options, limits};
 use super::track::{CameraPose, CameraTrack, Interpolation, Key};
 use crate::format::ReadOptions;
 use crate::math::{DVec3, Vec3};
-use crate::scene::{Aov, AovSet, Camera, Filter, Light, Shot};
+use crate::scene::{self, Aov, AovSet, Camera, Filter, Light, Shot};
 
 /// Picture formats of this version, by their words.
-pub const FORMATS: [&str; 3] = ["png", "exr", "ppm"];
+pub const FORMATS: [&str; 19] = [
+    "png", "exr", "ppm", "pgm", "pbm", "jpg", "jpeg", "jpe", "bmp", "dib", "tif", "tiff", "jp2", "sr", "ras",
+    "tga", "webp", "qoi", "hdr",
+];
+
+/// Those that hold 16 bits a channel.
+const SIXTEEN_BITS: [&str; 6] = ["png", "tif", "tiff", "ppm", "pgm", "jp2"];
+/// Those that hold floats, whatever the bits.
+const FLOATS: [&str; 2] = ["exr", "hdr"];
 
 /// Everything that bears on one picture but its geometry.
 #[derive(Clone, Debug, PartialEq)]
@@ -58,6 +66,10 @@ impl Settings {
     /// Fills in what the options leave open.
     pub fn new(options: &Options) -> Result<Self, String> {
         let o = options.clone();
+        let format = o.format.clone().unwrap_or_else(|| FORMATS[0].to_string());
+        if o.bits == Some(16) && !SIXTEEN_BITS.contains(&&*format) && !FLOATS.contains(&&*format) {
+            return Err(format!("{format} has 8 bits a channel; 16 have {}", SIXTEEN_BITS.join(", ")));
+        }
         let read = ReadOptions {
             smooth_angle_deg: o.smooth_angle,
             mtl_srgb: o.mtl_srgb.unwrap_or(false),
@@ -79,7 +91,7 @@ impl Settings {
             prune: o.prune.unwrap_or(1.0 / 4096.0),
             alpha: o.alpha.unwrap_or(false),
             aovs: o.aov.unwrap_or_default(),
-            format: o.format.unwrap_or_else(|| FORMATS[0].to_string()),
+            format,
             bits: o.bits.unwrap_or(8),
             quality: o.quality.unwrap_or(92),
             exposure_stops: o.exposure.unwrap_or(0.0),
@@ -89,7 +101,7 @@ impl Settings {
     }
 
     /// The shot of a frame with the camera, lights and background that were found for it.
-    pub fn shot(&self, camera: Camera, lights: Vec<Light>, background: crate::scene::Background) -> Shot {
+    pub fn shot(&self, camera: Camera, lights: Vec<Light>, background: scene::Background) -> Shot {
         Shot {
             camera,
             lights,
@@ -285,5 +297,10 @@ mod tests {
         assert!(light("spot:1,2,3").is_err() && light("point:1,2").is_err());
         assert!(up("0,0,0").is_err() && up("z") == Ok(DVec3::Z));
         assert!(format_word("PNG") == Ok("png".to_string()) && format_word("gif").is_err());
+        let sixteen = |format: &str| {
+            Settings::new(&Options { format: Some(format.to_string()), bits: Some(16), ..Options::default() })
+                .is_ok()
+        };
+        assert!(sixteen("jp2") && sixteen("exr") && !sixteen("bmp"));
     }
 }

@@ -4,7 +4,7 @@
 use super::maps::{MapPoint, textured, tilted};
 use super::material::{HALO, MaterialRecord, TEXTURED, TEXTURED_SHADOW};
 use super::texture::linear_from_srgb;
-use crate::accel::{Aabb, Hit, Placement, Ray, hit_point, magnitude};
+use crate::accel::{Aabb, Hit, Placement, Ray, extent, hit_point, magnitude};
 use crate::math::{DAffine3, DMat3, Mat3, Vec3};
 use crate::scene::{ABSENT, Frame, Geometry, Material, Object, PartHash, Textures};
 use std::collections::HashMap;
@@ -280,7 +280,8 @@ impl WorldObject<'_> {
             }
             Some(t) => {
                 let [a, b, c] = corners.map(|i| t.placement.magnitude(vertex(i)));
-                (corners.map(|i| t.placement.point(vertex(i))), a.max(b).max(c), t.orientation)
+                let p = corners.map(|i| t.placement.point(vertex(i)));
+                (p, a.max(b).max(c) + extent(&p), t.orientation)
             }
         }
     }

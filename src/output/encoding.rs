@@ -1,7 +1,7 @@
 //! Which files a picture has, and the encoder of each format.
 
 use super::error::OutputError;
-use super::{exr, png, ppm};
+use super::{exr, jp2, png, pnm, rasters, sun};
 use crate::film::Film;
 use crate::scene::{AovSet, PartHasher};
 use std::path::{Path, PathBuf};
@@ -15,31 +15,67 @@ pub enum Format {
     Exr,
     /// Portable pixmap, binary (P6): integers on the sRGB curve, no alpha.
     Ppm,
+    /// Portable graymap, binary (P5): luma of linear light, on the curve.
+    Pgm,
+    /// Portable bitmap, binary (P4): that, cut at one half.
+    Pbm,
+    /// JPEG.
+    Jpeg,
+    /// Windows bitmap.
+    Bmp,
+    /// TIFF.
+    Tiff,
+    /// JPEG 2000, lossless.
+    Jp2,
+    /// Sun raster.
+    Sun,
+    /// Truevision TGA.
+    Tga,
+    /// WebP, lossless.
+    Webp,
+    /// Quite OK Image.
+    Qoi,
+    /// Radiance HDR: linear floats with a shared exponent.
+    Hdr,
 }
 
 struct FormatLine {
     format: Format,
-    word: &'static str,
+    /// Its words on the command line, which are file extensions.
+    words: &'static [&'static str],
     linear: bool,
-    encode: fn(&Film, Encoding) -> Result<Vec<u8>, String>,
+    encode: Encode,
 }
 
 /// One line a format, in the order of [`Format`].
-const FORMATS: [FormatLine; 3] = [
-    FormatLine { format: Format::Png, word: "png", linear: false, encode: png::encode },
-    FormatLine { format: Format::Exr, word: "exr", linear: true, encode: exr::encode },
-    FormatLine {
-        format: Format::Ppm,
-        word: "ppm",
-        linear: false,
-        encode: |film, encoding| Ok(ppm::encode(film, encoding)),
-    },
+const FORMATS: [FormatLine; 14] = [
+    line(Format::Png, &["png"], png::encode),
+    FormatLine { linear: true, ..line(Format::Exr, &["exr"], exr::encode) },
+    line(Format::Ppm, &["ppm"], |film, encoding| Ok(pnm::encode_ppm(film, encoding))),
+    line(Format::Pgm, &["pgm"], |film, encoding| Ok(pnm::encode_pgm(film, encoding))),
+    line(Format::Pbm, &["pbm"], |film, encoding| Ok(pnm::encode_pbm(film, encoding))),
+    line(Format::Jpeg, &["jpg", "jpeg", "jpe"], rasters::encode_jpeg),
+    line(Format::Bmp, &["bmp", "dib"], rasters::encode_bmp),
+    line(Format::Tiff, &["tif", "tiff"], rasters::encode_tiff),
+    line(Format::Jp2, &["jp2"], jp2::encode),
+    line(Format::Sun, &["sr", "ras"], sun::encode),
+    line(Format::Tga, &["tga"], rasters::encode_tga),
+    line(Format::Webp, &["webp"], rasters::encode_webp),
+    line(Format::Qoi, &["qoi"], rasters::encode_qoi),
+    FormatLine { linear: true, ..line(Format::Hdr, &["hdr"], |film, _| rasters::encode_hdr(film)) },
 ];
+
+type Encode = fn(&Film, Encoding) -> Result<Vec<u8>, String>;
+
+const fn line(format: Format, words: &'static [&'static str], encode: Encode) -> FormatLine {
+    FormatLine { format, words, linear: false, encode }
+}
 
 impl Format {
     /// The format of a word on the command line or a file's extension, in any case.
     pub fn from_word(word: &str) -> Option<Self> {
-        FORMATS.iter().find(|line| line.word.eq_ignore_ascii_case(word)).map(|line| line.format)
+        let has = |line: &&FormatLine| line.words.iter().any(|w| w.eq_ignore_ascii_case(word));
+        FORMATS.iter().find(has).map(|line| line.format)
     }
 
     /// The format that a file's extension names.
@@ -47,9 +83,9 @@ impl Format {
         Self::from_word(path.extension()?.to_str()?)
     }
 
-    /// Its word.
+    /// The first of its words.
     pub fn word(self) -> &'static str {
-        self.line().word
+        self.line().words[0]
     }
 
     fn line(self) -> &'static FormatLine {
@@ -87,6 +123,8 @@ pub struct Encoding {
     pub bits: Bits,
     /// Exposure in stops where the format holds integers.
     pub exposure_stops: f32,
+    /// Quality of JPEG, 1 to 100.
+    pub quality: u8,
 }
 
 impl Encoding {
@@ -96,6 +134,7 @@ impl Encoding {
         if !self.format.line().linear {
             h.u64(self.bits as u64);
             h.f32(self.exposure_stops);
+            h.u64(if self.format == Format::Jpeg { self.quality.into() } else { 0 });
         }
     }
 }
@@ -132,9 +171,9 @@ pub fn picture_files(
     let line = encoding.format.line();
     let refused = |format| move |why| OutputError::Encode { format, size: film.size, why };
     if film.rgb.is_empty() {
-        return Err(refused(line.word)("it has no pixels".into()));
+        return Err(refused(line.words[0])("it has no pixels".into()));
     }
-    let bytes = (line.encode)(film, encoding).map_err(refused(line.word))?;
+    let bytes = (line.encode)(film, encoding).map_err(refused(line.words[0]))?;
     let mut files = vec![PictureFile { path: picture.to_path_buf(), bytes }];
     if encoding.format != Format::Exr && film.aovs.any() {
         let bytes = exr::encode_aovs(film).map_err(refused("exr"))?;

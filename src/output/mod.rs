@@ -9,13 +9,16 @@ mod encoding;
 mod error;
 mod exr;
 mod finish;
+mod jp2;
 mod owner;
 mod png;
-mod ppm;
+mod pnm;
+mod rasters;
 mod read;
 mod record_name;
 mod records;
 mod run_log;
+mod sun;
 
 pub use atomic::write_atomic;
 pub use compare::{PictureComparison, PictureOutcome, compare_paths};

@@ -6,7 +6,7 @@ use super::read::{encoding, read_options};
 use super::report::Report;
 use super::{RunError, RunOptions};
 use crate::format;
-use crate::job::{Job, Picture};
+use crate::job::{Background, Job, Picture};
 use crate::output::{Records, file_names};
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
@@ -38,6 +38,9 @@ pub(super) fn nothing_is_lost(job: &Job, records: &Records, options: &RunOptions
 fn input_files(job: &Job) -> HashSet<PathBuf> {
     let mut files: HashSet<PathBuf> = job.inputs.iter().filter_map(|p| real(p)).collect();
     for picture in &job.pictures {
+        if let Background::File(file) = &picture.settings.background {
+            files.extend(real(file));
+        }
         let sequence = &job.sequences[picture.sequence];
         for source in &picture.sources {
             let Some(file) = source.file else { continue };

@@ -203,3 +203,6 @@ fn tell(new: &Warnings, all: &mut Warnings, report: &mut Report, on_event: &mut 
         on_event(&Event::Warning(w));
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -237,6 +237,7 @@ pub(super) fn encoding(settings: &Settings) -> Encoding {
         format: Format::from_word(&settings.format).unwrap_or(Format::Png),
         bits: Bits::from_number(settings.bits).unwrap_or_default(),
         exposure_stops: settings.exposure_stops,
+        quality: settings.quality,
     }
 }
 

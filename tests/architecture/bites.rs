@@ -1,92 +1,170 @@
-//! Each rule bites, on snippets made up for it.
+//! Each rule bites on a made-up file, and lets be what it should.
 
-use crate::rules::{File, House, OnePlace, Places, check};
+use crate::HOUSE;
+use crate::rules::{File, check};
 
-const HOUSE: House = House {
-    rooms: &["cli", "run", "plan", "scene"],
-    ground: &["math"],
-    one_place: &[
-        OnePlace {
-            rule: "only run writes",
-            names: &["std::fs::write", "std::fs::File::create*"],
-            places: Places::Only(&["run"]),
-        },
-        OnePlace { rule: "only cli prints", names: &["println!"], places: Places::Only(&["cli"]) },
-        OnePlace {
-            rule: "no file in plan",
-            names: &["std::fs", ".exists"],
-            places: Places::AllBut(&["plan"]),
-        },
-    ],
-    unsafe_files: &["src/plan/proved.rs"],
-    suites: &["src/plan/suite.rs"],
-    longest_file: 12,
-};
-
-/// `LINE: RULE` of each breach in one file.
-fn breaches(path: &str, text: &str) -> Vec<String> {
-    check(&HOUSE, &[File { path, text }]).iter().map(|b| format!("{}: {}", b.line, b.rule)).collect()
+/// The breaches of some files, as they would be printed.
+fn breaches(files: &[(&str, &str)]) -> Vec<String> {
+    let files: Vec<File<'_>> = files.iter().map(|&(path, text)| File { path, text }).collect();
+    check(&HOUSE, &files).iter().map(ToString::to_string).collect()
 }
 
-/// Whether exactly one breach is found, on this line, with this text in it.
-fn bites(path: &str, text: &str, line: usize, word: &str) {
-    let found = breaches(path, text);
-    assert!(
-        found.len() == 1 && found[0].starts_with(&format!("{line}: ")) && found[0].contains(word),
-        "{text}: {found:?}"
+/// One file breaks one rule, on line 2, with a message that says so.
+#[track_caller]
+fn bites(path: &str, second_line: &str, message: &str) {
+    let found = breaches(&[(path, &format!("use crate::math::Vec3;\n{second_line}\n"))]);
+    assert_eq!(found.len(), 1, "{found:#?}");
+    assert!(found[0].starts_with(&format!("{path}:2: ")), "{found:#?}");
+    assert!(found[0].contains(message), "{found:#?}");
+}
+
+#[track_caller]
+fn passes(path: &str, text: &str) {
+    assert_eq!(breaches(&[(path, text)]), [""; 0]);
+}
+
+#[test]
+fn rooms_use_only_rooms_below_them() {
+    let above = "`scene` may not use `format`";
+    bites("src/scene/mesh.rs", "use crate::format::obj;", above);
+    bites("src/scene/mesh.rs", "fn f() { crate::format::obj::read(); }", above);
+    bites("src/scene/mesh.rs", "use crate::{format::obj, math::Vec2};", above);
+    bites("src/scene/mesh.rs", "use super::super::format::obj as reader;", above);
+    bites("src/scene/mesh.rs", "mod inner { use super::super::super::format; }", above);
+    bites("src/scene/mesh.rs", "macro_rules! m { () => { $crate::format::obj::read() } }", above);
+    bites("src/scene/mesh.rs", "#[cfg(test)] mod tests { use crate::format::obj; }", above);
+    bites("src/math/mod.rs", "use crate::scene::Frame;", "`math` may not use `scene`");
+    assert_eq!(
+        breaches(&[("src/attic/mod.rs", "struct A;")]),
+        ["src/attic/mod.rs:1: `attic` is no room of the table"]
     );
 }
 
 #[test]
-fn rooms_use_what_lies_below_them() {
-    bites("src/plan/a.rs", "use crate::run::Run;", 1, "`plan` may not use `run`");
-    bites("src/scene.rs", "fn f() {\n    crate::plan::go()\n}", 2, "`scene` may not use `plan`");
-    bites("src/math/b.rs", "use crate::scene::Frame;", 1, "`math` may not use `scene`");
-    bites("src/attic.rs", "use crate::scene::Frame;", 1, "no room");
-    assert!(breaches("src/run/a.rs", "use crate::{plan::Plan, scene};\nuse crate::math::Vec3;").is_empty());
-    assert!(breaches("src/plan/a.rs", "// use crate::run::Run;\nconst S: &str = \"crate::run\";").is_empty());
+fn rooms_may_use_what_is_below_and_beside() {
+    passes(
+        "src/format/obj/mod.rs",
+        "use crate::scene::Frame; use crate::math; use super::mtl; use self::lines::Line;",
+    );
+    passes("src/cli/render.rs", "use crate::{run, device::{Device, cpu}, scene::*};");
+    passes("src/main.rs", "fn main() { rentix::cli::main(); }");
+    passes(
+        "src/scene/mod.rs",
+        "//! Read by [`crate::format`].\n/// See [`crate::run`].\npub struct A; // crate::run::B",
+    );
+    passes("src/clock.rs", "use crate::warning::Warning;");
 }
 
 #[test]
-fn what_has_one_place_has_no_other() {
-    bites("src/plan/a.rs", "fn f() { std::fs::remove_file(p) }", 1, "no file in plan");
-    bites("src/scene/a.rs", "use std::fs;\nfn f() { fs::write(p, b) }", 2, "only run writes");
-    bites("src/scene/a.rs", "use std::fs::File;\nfn f() { File::create_new(p) }", 2, "only run writes");
-    bites("src/run/a.rs", "fn f() { println!(\"x\") }", 1, "only cli prints");
-    bites("src/plan/a.rs", "fn f(p: &P) -> bool { p.exists() }", 1, "no file in plan");
-    assert!(breaches("src/run/a.rs", "fn f() { std::fs::write(p, b) }").is_empty());
-    assert!(
-        breaches("src/scene/a.rs", "#[cfg(test)]\nmod tests {\n    fn f() { std::fs::write(p, b) }\n}")
-            .is_empty()
+fn only_some_rooms_write_files() {
+    let rule = "only output, store, run and watch write files";
+    bites("src/film/mod.rs", "fn f() { std::fs::write(a, b); }", rule);
+    bites("src/film/mod.rs", "fn f() { use std::fs; fs::remove_dir_all(a); }", rule);
+    bites("src/film/mod.rs", "use std::fs::{create_dir_all};", rule);
+    bites("src/film/mod.rs", "use std::fs::{self as disk}; fn f() { disk::rename(a, b); }", rule);
+    bites("src/job/mod.rs", "use std::fs::File; fn f() { File::create_new(a); }", rule);
+    bites("src/job/mod.rs", "use std::fs::OpenOptions;", rule);
+    bites("src/job/mod.rs", "use std::fs::*;", rule);
+    passes("src/output/atomic.rs", "use std::fs::{File, rename}; fn f() { File::create(a); rename(a, b); }");
+    passes(
+        "src/film/mod.rs",
+        "fn f(out: &mut Vec<u8>) { out.write(b); remove(x); } struct File; fn g() { File::create(); }",
     );
 }
 
 #[test]
-fn test_modules_in_their_own_files_are_test_code() {
-    let files = [
-        File { path: "src/plan/mod.rs", text: "#[cfg(test)]\nmod tests;" },
-        File { path: "src/plan/tests.rs", text: "fn f() { std::fs::write(p, b).unwrap() }" },
-    ];
-    assert!(check(&HOUSE, &files).is_empty());
-    assert!(!check(&HOUSE, &files[1..]).is_empty(), "and not without the declaration");
+fn only_some_rooms_read_files() {
+    bites("src/film/mod.rs", "fn f() { std::fs::read(a); }", "read files");
+    bites("src/cli/mod.rs", "use std::fs::read_dir;", "read files");
+    passes("src/format/mod.rs", "fn f() { std::fs::File::open(a); memmap2::Mmap::map(b); }");
 }
 
 #[test]
-fn unsafe_and_unwrap_are_proved() {
-    bites("src/plan/a.rs", "// SAFETY: yes\nfn f() { unsafe { g() } }", 2, "not listed");
-    bites("src/plan/proved.rs", "fn f() { unsafe { g() } }", 1, "SAFETY");
-    assert!(
-        breaches("src/plan/proved.rs", "// SAFETY: g has no preconditions\nfn f() { unsafe { g() } }")
-            .is_empty()
+fn libraries_stay_in_their_rooms() {
+    bites("src/device/cpu/mod.rs", "use obvhs::bvh2::Bvh2;", "only accel names obvhs");
+    bites("src/device/cpu/mod.rs", "extern crate obvhs;", "only accel names obvhs");
+    bites("src/run/mod.rs", "fn f() { serde_yaml::from_str(a); }", "only job reads YAML");
+    bites("src/film/mod.rs", "use png::Decoder;", "only output knows picture formats");
+    bites("src/format/texture.rs", "use png::Encoder;", "only output encodes pictures");
+    bites("src/format/texture.rs", "use image::codecs::bmp::BmpEncoder;", "only output encodes pictures");
+    passes("src/format/texture.rs", "use png::Decoder; use image::codecs::bmp::BmpDecoder;");
+    passes("src/kernel/mod.rs", "fn f(image: &[f32]) { let png = image.len(); let exr = self.exr; }");
+}
+
+#[test]
+fn only_the_command_line_prints() {
+    bites("src/run/mod.rs", "fn f() { println!(\"a\"); }", "only cli prints");
+    bites("src/run/mod.rs", "fn f() { std::eprintln![\"a\"]; }", "only cli prints");
+    bites("src/run/mod.rs", "use std::io::{stderr as out};", "only cli prints");
+    bites("src/run/mod.rs", "use indicatif::ProgressBar;", "only cli prints");
+    passes("src/cli/mod.rs", "fn f() { println!(\"a\"); std::io::stderr().lock(); }");
+    passes("src/run/mod.rs", "/// `println!(\"a\")`\nconst A: &str = \"println!()\";");
+}
+
+#[test]
+fn clocks_threads_and_environment_have_one_place() {
+    bites("src/run/mod.rs", "fn f() { std::time::Instant::now(); }", "only clock reads clocks");
+    bites("src/run/mod.rs", "fn f() { std::env::var(a); }", "only cli reads arguments and environment");
+    bites("src/plan/mod.rs", "use std::time::Duration;", "no clock in");
+    bites("src/diff/mod.rs", "use crate::clock::Stopwatch;", "no clock in");
+    bites("src/kernel/mod.rs", "use rayon::prelude::*;", "no thread in");
+    bites("src/schedule/mod.rs", "fn f() { std::thread::spawn(g); }", "no thread in");
+    bites("src/scene/mod.rs", "fn f(path: &std::path::Path) -> bool { path.exists() }", "no file in");
+    passes(
+        "src/run/mod.rs",
+        "use std::time::Duration; use crate::clock; use std::thread; const V: &str = env!(\"V\");",
     );
-    bites("src/plan/a.rs", "fn f() {\n    x.unwrap();\n}", 2, "unwrap");
-    assert!(breaches("src/plan/suite.rs", "fn f() {\n    x.unwrap();\n}").is_empty());
-    assert!(breaches("src/plan/a.rs", "fn f() {\n    // x was checked\n    x.unwrap();\n}").is_empty());
 }
 
 #[test]
-fn long_and_unfinished_files_are_named() {
-    bites("benches/a.rs", &"//\n".repeat(13), 13, "split it");
-    bites("src/plan/a.rs", "fn f() { todo!() }", 1, "todo!");
-    bites("src/plan/a.rs", "fn f( {", 1, "not Rust");
+fn test_code_may_use_files_and_threads() {
+    let text = "#[cfg(test)]\nmod tests {\n    use std::{fs, thread, time::Instant};\n    fn f() { fs::read(a).unwrap(); }\n}";
+    passes("src/plan/mod.rs", text);
+    // The module may lie in a file of its own.
+    let own_file = ("src/plan/tests.rs", "fn f() { std::fs::read(a); }");
+    assert_eq!(breaches(&[("src/plan/mod.rs", "#[cfg(test)]\nmod tests;"), own_file]), [""; 0]);
+    assert_ne!(breaches(&[("src/plan/mod.rs", "mod tests;"), own_file]), [""; 0]);
+    // What follows a test module is no test code.
+    bites(
+        "src/plan/mod.rs",
+        "#[cfg(test)] mod tests { use std::fs::read; } use std::thread;",
+        "no thread in",
+    );
+}
+
+#[test]
+fn unsafe_is_listed_and_proved() {
+    bites("src/film/mod.rs", "fn f() { unsafe { g() } }", "not listed");
+    let house = crate::rules::House { unsafe_files: &["src/film/mod.rs"], ..HOUSE };
+    let found = |text| check(&house, &[File { path: "src/film/mod.rs", text }]).len();
+    assert_eq!(found("fn f() {\n    unsafe { g() }\n}"), 1);
+    assert_eq!(found("fn f() {\n    // Fast.\n    unsafe { g() }\n}"), 1);
+    assert_eq!(found("// SAFETY: of f\nfn f() {\n    unsafe { g() }\n}"), 1);
+    assert_eq!(found("fn f() {\n    // SAFETY: g has no\n    // conditions.\n    unsafe { g() }\n}"), 0);
+    assert_eq!(
+        found("fn f() {\n    // SAFETY: g has no conditions.\n    let a =\n        unsafe { g() };\n}"),
+        0
+    );
+    assert_eq!(found("/// # Safety\n/// None.\n#[inline]\nunsafe fn f() {}"), 0);
+}
+
+#[test]
+fn unwrap_is_proved() {
+    bites("src/film/mod.rs", "fn f() { a.unwrap(); }", "without a comment");
+    bites("src/film/mod.rs", "fn f() { a.expect(\"b\"); }", "without a comment");
+    passes("src/film/mod.rs", "fn f() {\n    // Four bytes make a word.\n    a.b()\n        .unwrap();\n}");
+    passes("src/device/conformance.rs", "fn f() { a.unwrap(); }");
+    passes("src/film/mod.rs", "fn f() { a.unwrap_or(b); a.unwrap(); // never empty\n}");
+}
+
+#[test]
+fn files_are_short_finished_and_read() {
+    let long = "\n".repeat(501);
+    assert_eq!(breaches(&[("tests/a.rs", &long)]).len(), 1);
+    assert_eq!(breaches(&[("shaders/a.wgsl", &long)]).len(), 1);
+    assert_eq!(breaches(&[("tests/a.rs", &long[1..])]), [""; 0]);
+    bites("examples/a.rs", "fn f() { todo![] }", "`todo!` is left behind");
+    bites("tests/a.rs", "fn f() { unimplemented![] }", "`unimplemented!` is left behind");
+    bites("src/film/mod.rs", "fn f() { dbg![a] }", "`dbg!` is left behind");
+    assert_eq!(breaches(&[("src/film/mod.rs", "fn f( {")]).len(), 1);
 }

@@ -60,6 +60,7 @@ pub(crate) fn check(house: &House, files: &[File<'_>]) -> Vec<Breach> {
     let mut sources = Vec::new();
     for file in files {
         breaches.extend(length(house, file));
+        breaches.extend(unknown_room(house, file));
         if Path::new(file.path).extension().is_some_and(|e| e == "rs") {
             match source::read(file.text, &module_path(file.path)) {
                 Ok(source) => sources.push((file, source)),
@@ -112,26 +113,36 @@ fn unfinished(file: &File<'_>, name: &Name) -> Option<Breach> {
     left.then(|| breach(file, name.line, format!("`{}!` is left behind", name.path[0])))
 }
 
+/// The room of a place; `main` belongs to the top.
+fn room(place: &str) -> &str {
+    if place == "main" { "cli" } else { place.split('/').next().unwrap_or(place) }
+}
+
+/// How far below the top a room lies.
+fn level(house: &House, room: &str) -> Option<usize> {
+    let rank = house.rooms.iter().position(|r| *r == room);
+    rank.or_else(|| house.ground.contains(&room).then_some(house.rooms.len()))
+}
+
+fn unknown_room(house: &House, file: &File<'_>) -> Option<Breach> {
+    let room = room(file.path.strip_prefix("src/")?.trim_end_matches(".rs"));
+    let rule = || format!("`{room}` is no room of the table");
+    (room != "lib" && level(house, room).is_none()).then(|| breach(file, 1, rule()))
+}
+
 /// A room uses rooms below it and the ground floor.
 fn above(house: &House, file: &File<'_>, place: &str, name: &Name) -> Option<Breach> {
     if place == "lib" || !matches!(name.kind, Kind::Path | Kind::Import) {
         return None;
     }
-    let own = if place == "main" { "cli" } else { place.split('/').next()? };
+    let own = room(place);
     let named = match name.path.first()?.as_str() {
         "crate" => name.path.get(1)?,
         "rentix" if place == "main" => name.path.get(1)?,
         _ => return None,
     };
-    let level = |room: &str| {
-        let rank = house.rooms.iter().position(|r| *r == room);
-        rank.or_else(|| house.ground.contains(&room).then_some(house.rooms.len()))
-    };
-    let Some(floor) = level(own) else {
-        return Some(breach(file, name.line, format!("`{own}` is no room of the table")));
-    };
     let rule = format!("`{own}` may not use `{named}`: a room uses rooms below it");
-    (level(named)? < floor).then(|| breach(file, name.line, rule))
+    (level(house, named)? < level(house, own)?).then(|| breach(file, name.line, rule))
 }
 
 fn out_of_place(house: &House, file: &File<'_>, place: &str, name: &Name) -> Vec<Breach> {

@@ -10,6 +10,11 @@ use std::path::Path;
 pub(super) const MAX_SIDE: u32 = 16_384;
 /// The most bytes that its first level may take: 16,384 x 16,384 texels of four bytes.
 pub(super) const MAX_BYTES: u64 = 1 << 30;
+/// So many bytes its first level may take whatever its file's size.
+const FREE_BYTES: u64 = 64 << 20;
+/// Beyond those, the most bytes a byte of the file may become. Deflate gives 1,032 at most, and four for three where
+/// alpha is added.
+const MAX_RATIO: u64 = 4096;
 
 const EXR_MAGIC: [u8; 4] = [0x76, 0x2f, 0x31, 0x01];
 
@@ -42,8 +47,8 @@ pub(super) fn decode(bytes: &[u8], path: &Path) -> Result<Picture, String> {
     if bytes.starts_with(&EXR_MAGIC) { decode_exr(bytes) } else { decode_image(bytes, path) }
 }
 
-/// Refuses pictures that are too large, before they take memory.
-fn check_size(width: u64, height: u64, texel_bytes: u64) -> Result<(), String> {
+/// Refuses pictures that are too large, or larger than so few bytes of file can mean, before they take memory.
+fn check_size(width: u64, height: u64, texel_bytes: u64, file_bytes: usize) -> Result<(), String> {
     if width == 0 || height == 0 {
         return Err(format!("has {width} x {height} texels, none at all"));
     }
@@ -52,6 +57,11 @@ fn check_size(width: u64, height: u64, texel_bytes: u64) -> Result<(), String> {
         return Err(format!(
             "has {width} x {height} texels, {bytes} bytes; at most {MAX_SIDE} a side and {MAX_BYTES} bytes are \
              taken, scale it down"
+        ));
+    }
+    if bytes > FREE_BYTES + MAX_RATIO * file_bytes as u64 {
+        return Err(format!(
+            "is broken: it says {width} x {height} texels, more than its {file_bytes} bytes can hold"
         ));
     }
     Ok(())
@@ -76,7 +86,7 @@ fn decode_image(bytes: &[u8], path: &Path) -> Result<Picture, String> {
     let sample_bytes = u64::from(color.bytes_per_pixel() / color.channel_count());
     // finer integers are held as floats
     let held_bytes = if sample_bytes == 1 { 4 } else { 16 };
-    check_size(width.into(), height.into(), held_bytes)?;
+    check_size(width.into(), height.into(), held_bytes, bytes.len())?;
     let image = DynamicImage::from_decoder(decoder).map_err(broken)?;
     let size = [image.width(), image.height()];
     let texels = match sample_bytes {
@@ -128,7 +138,7 @@ fn decode_exr(bytes: &[u8]) -> Result<Picture, String> {
     let meta = MetaData::read_from_buffered(Cursor::new(bytes), false).map_err(broken)?;
     for Header { layer_size, channels, .. } in &meta.headers {
         let channels = channels.list.len().max(4) as u64;
-        check_size(layer_size.0 as u64, layer_size.1 as u64, 4 * channels)?;
+        check_size(layer_size.0 as u64, layer_size.1 as u64, 4 * channels, bytes.len())?;
     }
     let image = read()
         .no_deep_data()

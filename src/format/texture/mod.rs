@@ -9,7 +9,7 @@ use crate::clock::FileTime;
 use crate::scene::{Part, TexelSpace, Texels, Texture};
 use decode::Picture;
 use rayon::prelude::*;
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 use std::fs;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
@@ -67,38 +67,45 @@ pub(super) struct LoadedTexture {
 }
 
 impl TextureCache {
-    /// The textures in those files.
+    /// The textures in those files, each decoded where it is not held.
     pub(super) fn load(&self, wanted: &[(PathBuf, TextureUse)]) -> Vec<LoadedTexture> {
         let keys: Vec<_> = wanted.iter().map(|(path, texture_use)| key(path, *texture_use)).collect();
         let mut held = self.held.lock().unwrap_or_else(PoisonError::into_inner);
         held.loads += 1;
         let this_load = held.loads;
-        let absent: Vec<Option<&Key>> =
-            keys.iter().map(|key| key.as_ref().ok().filter(|key| !held.textures.contains_key(key))).collect();
-        let decoded: Vec<Option<_>> =
-            absent.par_iter().map(|key| key.map(|key| (key, decoded(&key.path, key.texture_use)))).collect();
-        let mut read = vec![0; keys.len()];
-        for (read, (key, texture)) in read.iter_mut().zip(decoded).filter_map(|(read, d)| Some((read, d?))) {
-            *read = key.size;
-            let texture = texture.map_err(|error| error.to_string());
-            held.textures.insert(key.clone(), Entry { texture, last_load: this_load });
+        // two names of one file have one key
+        let absent: HashSet<&Key> =
+            keys.iter().flatten().filter(|key| !held.textures.contains_key(key)).collect();
+        let mut decoded: HashMap<&Key, _> =
+            absent.into_par_iter().map(|key| (key, decoded(&key.path, key.texture_use))).collect();
+        let mut textures = Vec::with_capacity(keys.len());
+        for key in &keys {
+            textures.push(match key {
+                Err(error) => LoadedTexture { texture: Err(error.to_string()), bytes_read: 0 },
+                Ok(key) => held.take(key, decoded.remove(key)),
+            });
         }
-        let of_key = |held: &mut Held, key: &Key| {
-            let entry = held.textures.get_mut(key)?;
-            entry.last_load = this_load;
-            Some(entry.texture.clone())
-        };
-        let textures = keys.iter().zip(read).map(|(key, bytes_read)| LoadedTexture {
-            texture: match key {
-                // every key was held or has just been decoded
-                Ok(key) => of_key(&mut held, key).unwrap_or_else(|| Err("is gone".to_owned())),
-                Err(error) => Err(error.to_string()),
-            },
-            bytes_read,
-        });
-        let textures = textures.collect();
         held.textures.retain(|_, entry| entry.last_load + KEPT_LOADS > this_load);
         textures
+    }
+}
+
+impl Held {
+    /// The texture of a key, which is held or was just decoded.
+    fn take(&mut self, key: &Key, decoded: Option<Result<Part<Texture>, FormatError>>) -> LoadedTexture {
+        let bytes_read = if decoded.is_some() { key.size } else { 0 };
+        if let Some(decoded) = decoded {
+            let texture = decoded.map_err(|error| error.to_string());
+            self.textures.insert(key.clone(), Entry { texture, last_load: self.loads });
+        }
+        let texture = match self.textures.get_mut(key) {
+            Some(entry) => {
+                entry.last_load = self.loads;
+                entry.texture.clone()
+            }
+            None => Err(format!("{}: was not decoded", key.path.display())),
+        };
+        LoadedTexture { texture, bytes_read }
     }
 }
 

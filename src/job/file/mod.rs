@@ -303,12 +303,10 @@ fn light(l: schema::Light) -> Result<Light, Wrong> {
                 falloff: falloff(s.falloff),
             })
         }
-        (None, None, None, Some(a)) => match a.material {
-            Some(m) if m.0 != "all" => {
-                Err(("lights", format!("an area light is of material `all`, not `{}`", m.0)))
-            }
-            _ => Ok(Light::Area { samples: a.samples.map_or(1, |n| n.0 as u32) }),
-        },
+        (None, None, None, Some(a)) => {
+            let (Some(schema::AllMaterials::All) | None) = a.material;
+            Ok(Light::Area { samples: a.samples.map_or(1, |n| n.0 as u32) })
+        }
         _ => Err(("lights", "each light is one of point, directional, spot, area".to_string())),
     }
 }

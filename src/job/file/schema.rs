@@ -159,14 +159,6 @@ pub(super) struct Light {
     pub area: Option<Area>,
 }
 
-/// Every triangle that glows.
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(super) struct Area {
-    pub material: Option<Word>,
-    pub samples: Option<Number<Samples>>,
-}
-
 #[derive(Clone, Copy, Deserialize, Default)]
 #[serde(rename_all = "kebab-case")]
 pub(super) enum Falloff {
@@ -191,6 +183,20 @@ pub(super) struct Directional {
     pub direction: Triple<Any>,
     pub color: Option<Triple<Color>>,
     pub intensity: Option<Number<Color>>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Area {
+    pub material: Option<AllMaterials>,
+    pub samples: Option<Number<Samples>>,
+}
+
+/// Which materials' triangles are meant: those of all.
+#[derive(Clone, Copy, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub(super) enum AllMaterials {
+    All,
 }
 
 #[derive(Deserialize)]

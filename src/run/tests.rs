@@ -1,0 +1,118 @@
+//! The run around the fake device: faults fail their own frame, each picture shows its own frame.
+
+use super::*;
+use crate::device::fake::{FakeDevice, Fault};
+use crate::job::{Request, resolve};
+use crate::warning::Warnings;
+use std::path::Path;
+
+const FRAMES: usize = 6;
+
+/// Frames of one triangle that grows.
+fn sequence(folder: &Path) -> Request {
+    for frame in 1..=FRAMES {
+        let obj = format!("v 0 0 0\nv {frame} 0 0\nv 0 1 0\nf 1 2 3\n");
+        std::fs::write(folder.join(format!("t_{frame}.obj")), obj).unwrap();
+    }
+    Request {
+        inputs: vec![folder.to_path_buf()],
+        options: crate::job::Options { size: Some([4, 4]), ..crate::job::Options::default() },
+        folder: Some(folder.join("out")),
+        ..Request::default()
+    }
+}
+
+fn statuses(outcome: &Outcome) -> Vec<(Option<i64>, Status)> {
+    outcome.report.frames.iter().map(|f| (f.frame, f.status)).collect()
+}
+
+fn run(request: &Request, faults: &[(usize, Fault)], options: &RunOptions) -> Outcome {
+    let job = resolve(request).unwrap();
+    let mut device = FakeDevice::new("fake", 1 << 20);
+    for &(picture, fault) in faults {
+        let frame = read_frame(
+            &job,
+            &job.pictures[picture],
+            &source::Sources::default(),
+            false,
+            &mut Warnings::default(),
+        )
+        .unwrap();
+        device = device.with_fault(frame.hash(), fault);
+    }
+    render(&job, options, Box::new(device), &Stop::default(), &mut |_| {}).unwrap()
+}
+
+fn two_threads() -> RunOptions {
+    RunOptions { threads: 2, ..RunOptions::default() }
+}
+
+#[test]
+fn a_panic_and_a_lack_of_memory_fail_their_own_frames() {
+    let t = tempfile::tempdir().unwrap();
+    let request = sequence(t.path());
+    // the panic is meant; its text need not stand in the test's output
+    let hook = std::panic::take_hook();
+    std::panic::set_hook(Box::new(|_| {}));
+    let outcome = run(&request, &[(1, Fault::Panic), (3, Fault::OutOfMemory)], &two_threads());
+    std::panic::set_hook(hook);
+    let failed: Vec<_> = outcome.failed().collect();
+    assert_eq!(failed.iter().map(|f| f.frame).collect::<Vec<_>>(), [Some(2), Some(4)]);
+    let error = |i: usize| failed[i].error.clone().unwrap_or_default();
+    assert!(error(0).contains("t_2.obj: internal error while tracing"), "{}", error(0));
+    assert!(error(1).contains("t_4.obj") && failed[1].device_failed, "{}", error(1));
+    assert_eq!(outcome.report.totals.rendered, 4);
+    // the second run makes what is missing, and only that
+    let again = run(&request, &[], &two_threads());
+    assert_eq!((again.report.totals.rendered, again.report.totals.resumed), (2, 4));
+}
+
+#[test]
+fn a_lost_device_fails_what_comes_after_it() {
+    let t = tempfile::tempdir().unwrap();
+    let outcome = run(&sequence(t.path()), &[(2, Fault::Lost)], &two_threads());
+    let want: Vec<_> = (1..=FRAMES as i64)
+        .map(|f| (Some(f), if f < 3 { Status::Rendered } else { Status::Failed }))
+        .collect();
+    assert_eq!(statuses(&outcome), want);
+    assert!(outcome.failed().all(|f| f.device_failed));
+}
+
+#[test]
+fn each_picture_shows_its_own_frame_whatever_the_order() {
+    let t = tempfile::tempdir().unwrap();
+    let mut request = sequence(t.path());
+    run(&request, &[], &RunOptions { threads: 1, ..RunOptions::default() });
+    let first = pictures(&t.path().join("out"));
+    let different: std::collections::BTreeSet<_> = first.iter().map(|(_, bytes)| bytes.clone()).collect();
+    assert_eq!(different.len(), FRAMES);
+    request.order = crate::job::Order::Shuffle;
+    request.folder = Some(t.path().join("shuffled"));
+    run(&request, &[], &two_threads());
+    assert_eq!(pictures(&t.path().join("shuffled")), first);
+}
+
+fn pictures(folder: &Path) -> Vec<(String, Vec<u8>)> {
+    (1..=FRAMES)
+        .map(|f| format!("t_{f}.png"))
+        .map(|n| (n.clone(), std::fs::read(folder.join(n)).unwrap()))
+        .collect()
+}
+
+#[test]
+fn a_run_that_is_told_to_stop_before_it_begins_makes_nothing() {
+    let t = tempfile::tempdir().unwrap();
+    let job = resolve(&sequence(t.path())).unwrap();
+    let stop = Stop::default();
+    stop.ask();
+    let device = Box::new(FakeDevice::new("fake", 1 << 20));
+    let outcome = render(&job, &two_threads(), device, &stop, &mut |_| {}).unwrap();
+    assert!(outcome.stopped && outcome.report.frames.is_empty() && !t.path().join("out").exists());
+}
+
+#[test]
+fn job_and_output_know_the_same_formats() {
+    for word in crate::job::settings::FORMATS {
+        assert!(crate::output::Format::from_word(word).is_some(), "{word}");
+    }
+}
