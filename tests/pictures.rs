@@ -22,6 +22,9 @@ fn film(alpha: bool, aovs: bool) -> Film {
         position: Some(vec![[1.0, -2.0, 1e6], [0.0; 3]]),
         albedo: Some(vec![[0.5, 0.25, 0.125], [0.0; 3]]),
         id: Some(vec![[3, 1 << 24 | 1], [u32::MAX; 2]]),
+        material: Some(vec![7, u32::MAX]),
+        uv: Some(vec![[0.25, -3.5], [0.0; 2]]),
+        coverage: Some(vec![1.0, 0.5]),
     };
     Film {
         size: [2, 1],

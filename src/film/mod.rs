@@ -33,6 +33,13 @@ pub struct Aovs {
     pub albedo: Option<Vec<[f32; 3]>>,
     /// `[id.part, id.triangle]`, 0xFFFFFFFF where nothing is hit.
     pub id: Option<Vec<[u32; 2]>>,
+    /// The material, by its place among the frame's distinct ones in the order of their first use; 0xFFFFFFFF where
+    /// nothing is hit.
+    pub material: Option<Vec<u32>>,
+    /// Texture coordinates; 0 where nothing is hit, or where there are none.
+    pub uv: Option<Vec<[f32; 2]>>,
+    /// What is not background, mean over the samples.
+    pub coverage: Option<Vec<f32>>,
 }
 
 impl Aovs {
@@ -43,6 +50,9 @@ impl Aovs {
             || self.position.is_some()
             || self.albedo.is_some()
             || self.id.is_some()
+            || self.material.is_some()
+            || self.uv.is_some()
+            || self.coverage.is_some()
     }
 }
 
@@ -60,6 +70,9 @@ impl Film {
                 position: aovs.contains(Aov::Position).then(|| vec![[0.0; 3]; n]),
                 albedo: aovs.contains(Aov::Albedo).then(|| vec![[0.0; 3]; n]),
                 id: aovs.contains(Aov::Id).then(|| vec![[u32::MAX; 2]; n]),
+                material: aovs.contains(Aov::Material).then(|| vec![u32::MAX; n]),
+                uv: aovs.contains(Aov::Uv).then(|| vec![[0.0; 2]; n]),
+                coverage: aovs.contains(Aov::Coverage).then(|| vec![0.0; n]),
             },
         }
     }

@@ -25,6 +25,12 @@ pub struct FilmBand<'a> {
     pub albedo: Option<&'a mut [[f32; 3]]>,
     /// As [`crate::film::Aovs::id`].
     pub id: Option<&'a mut [[u32; 2]]>,
+    /// As [`crate::film::Aovs::material`].
+    pub material: Option<&'a mut [u32]>,
+    /// As [`crate::film::Aovs::uv`].
+    pub uv: Option<&'a mut [[f32; 2]]>,
+    /// As [`crate::film::Aovs::coverage`].
+    pub coverage: Option<&'a mut [f32]>,
 }
 
 impl FilmBand<'_> {
@@ -35,7 +41,12 @@ impl FilmBand<'_> {
 
     /// Whether an auxiliary picture of the ray through the pixel's centre is wanted.
     pub fn wants_center(&self) -> bool {
-        self.depth.is_some() || self.normal.is_some() || self.position.is_some() || self.id.is_some()
+        self.depth.is_some()
+            || self.normal.is_some()
+            || self.position.is_some()
+            || self.id.is_some()
+            || self.material.is_some()
+            || self.uv.is_some()
     }
 }
 
@@ -50,6 +61,9 @@ pub fn bands(film: &mut Film, rows: u32) -> Vec<FilmBand<'_>> {
     let mut position = aovs.position.as_mut().map(|p| p.chunks_mut(pixels));
     let mut albedo = aovs.albedo.as_mut().map(|p| p.chunks_mut(pixels));
     let mut id = aovs.id.as_mut().map(|p| p.chunks_mut(pixels));
+    let mut material = aovs.material.as_mut().map(|p| p.chunks_mut(pixels));
+    let mut uv = aovs.uv.as_mut().map(|p| p.chunks_mut(pixels));
+    let mut coverage = aovs.coverage.as_mut().map(|p| p.chunks_mut(pixels));
     film.rgb
         .chunks_mut(pixels)
         .enumerate()
@@ -64,6 +78,9 @@ pub fn bands(film: &mut Film, rows: u32) -> Vec<FilmBand<'_>> {
             position: position.as_mut().and_then(Iterator::next),
             albedo: albedo.as_mut().and_then(Iterator::next),
             id: id.as_mut().and_then(Iterator::next),
+            material: material.as_mut().and_then(Iterator::next),
+            uv: uv.as_mut().and_then(Iterator::next),
+            coverage: coverage.as_mut().and_then(Iterator::next),
         })
         .collect()
 }

@@ -46,13 +46,6 @@ impl CameraConstants {
     }
 }
 
-impl CameraConstants {
-    /// How much wider than a point a pixel's cone is for each unit of length: 2·tan(fov/2)/H.
-    pub fn spread(&self) -> f32 {
-        self.down.length()
-    }
-}
-
 /// The ray through (x, y) of the picture, in pixels from its upper left corner; its direction is unit.
 pub fn camera_ray(c: &CameraConstants, x: f32, y: f32) -> Ray {
     let direction = c.forward + c.right * (x - c.center_x) + c.down * (y - c.center_y);

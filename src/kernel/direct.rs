@@ -1,25 +1,72 @@
 //! Direct light: shadow rays from many surfaces to one light after the other.
 
-use super::light::{Incident, LightRecord, incident};
-use super::shade::{Reflected, faces, reflect};
+use super::light::{AREA, Incident, LightRecord, incident};
+use super::material::MaterialRecord;
+use super::sampler::{hash, unit_square_for};
+use super::scene::Scene;
+use super::shade::{Reflected, faces, reflect, unshadowed};
 use super::world::{Surface, World};
 use super::{RayCounts, SURFACES_MAX};
 use crate::accel::{Aggregate, HitOrder, Ray, offset_origin};
 use crate::math::Vec3;
+use std::borrow::Borrow;
 
 /// A surface on its way to a colour.
 #[derive(Clone, Copy, Debug)]
 pub struct Shading {
+    /// The path that is there, by its place.
+    pub path: u32,
     /// The pixel, by its place in the tile.
     pub pixel: u32,
     /// What its colour counts for there.
-    pub weight: f32,
+    pub weight: Vec3,
     /// The surface.
     pub surface: Surface,
+    /// The material's constants at this point: a place in [`World::materials`], or beyond them in [`Constants::own`].
+    pub constants: u32,
     /// Unit vector towards the viewer.
     pub view: Vec3,
     /// What its lights add up to.
     pub sum: Reflected,
+}
+
+/// The constants of materials as shading points see them.
+#[derive(Clone, Copy, Debug)]
+pub struct Constants<'a> {
+    /// Those of the frame.
+    pub all: &'a [MaterialRecord],
+    /// Those of single points, where maps, angles or media change them.
+    pub own: &'a [MaterialRecord],
+}
+
+impl<'a> Constants<'a> {
+    /// Those of a shading point.
+    pub fn of(&self, s: &Shading) -> &'a MaterialRecord {
+        let place = s.constants as usize;
+        self.all.get(place).unwrap_or_else(|| &self.own[place - self.all.len()])
+    }
+}
+
+/// Which of a pixel's samples is being taken, and where its paths are.
+#[derive(Clone, Copy, Debug)]
+pub struct Sample<'a> {
+    /// The pixels of the tile, (column, row in the band).
+    pub pixels: &'a [[u32; 2]],
+    /// The band's first row.
+    pub first_row: u32,
+    /// The sample's number.
+    pub index: u32,
+    /// Surfaces that each path has met before in this sample.
+    pub step: u32,
+}
+
+impl Sample<'_> {
+    /// A point of the unit square for point `k` of `count` of a light at a shading point.
+    fn point(&self, pixel: u32, light: u32, k: u32, count: u32, seed: u32) -> [f32; 2] {
+        let [x, row] = self.pixels[pixel as usize];
+        let index = self.index.wrapping_mul(count).wrapping_add(k);
+        unit_square_for(hash(self.step) ^ light, index, [x, self.first_row + row], seed)
+    }
 }
 
 /// Room for the shadow rays of one light, kept from light to light.
@@ -34,47 +81,52 @@ pub struct ShadowRays {
 
 /// Adds each light, in the order given, to each surface's sum.
 pub fn add_lights<A: Aggregate>(
-    aggregate: &A,
-    world: &World,
-    lights: &[LightRecord],
+    scene: &Scene<A>,
+    constants: Constants,
+    sample: Sample,
     shadings: &mut [Shading],
     shadow: &mut ShadowRays,
     counts: &mut RayCounts,
 ) {
-    for light in lights {
-        shadow.aim(world, light, shadings);
-        counts.shadow += shadow.rays.len() as u64;
-        if world.is_opaque {
-            shadow.occluded.resize(shadow.rays.len(), false);
-            aggregate.occluded_batch(&shadow.rays, &shadow.ends, &mut shadow.occluded);
-        }
-        for (ray, &(place, incident)) in shadow.lit.iter().enumerate() {
-            let visibility = if world.is_opaque {
-                f32::from(u8::from(!shadow.occluded[ray]))
-            } else {
-                transmittance(aggregate, world, &shadow.rays[ray], shadow.ends[ray])
-            };
-            if visibility > 0.0 {
-                let s = &mut shadings[place as usize];
-                let material = &world.materials[s.surface.material as usize];
-                let reflected = reflect(&s.surface, material, s.view, &incident);
-                s.sum.diffuse += reflected.diffuse * visibility;
-                s.sum.specular += reflected.specular * visibility;
+    for (number, light) in (0..).zip(&scene.lights) {
+        if light.kind == AREA {
+            for k in 0..light.samples {
+                shadow.aim(constants, shadings, |s: &Shading| {
+                    let at = sample.point(s.pixel, number, k, light.samples, scene.shot.seed);
+                    let mut light = *light;
+                    if let Some(stand_in) = scene.emitters.stand_in(&scene.world, s.surface.position, at) {
+                        light =
+                            LightRecord { radiance: stand_in.radiance / light.samples as f32, ..stand_in };
+                    }
+                    light
+                });
+                shadow.trace(scene, constants, shadings, counts);
             }
+        } else {
+            shadow.aim(constants, shadings, |_| light);
+            shadow.trace(scene, constants, shadings, counts);
         }
     }
 }
 
 impl ShadowRays {
     /// Collects the rays to a light from those surfaces that it can reach.
-    fn aim(&mut self, world: &World, light: &LightRecord, shadings: &[Shading]) {
+    fn aim<L: Borrow<LightRecord>>(
+        &mut self,
+        constants: Constants,
+        shadings: &mut [Shading],
+        light: impl Fn(&Shading) -> L,
+    ) {
         self.rays.clear();
         self.ends.clear();
         self.lit.clear();
-        for (place, s) in shadings.iter().enumerate() {
-            if world.materials[s.surface.material as usize].illum == 0 {
+        for (place, s) in shadings.iter_mut().enumerate() {
+            let illum = constants.of(s).illum;
+            if illum == 0 {
                 continue;
             }
+            let light = light(s);
+            let light = light.borrow();
             let incident = incident(light, s.surface.position);
             if faces(&s.surface, incident.direction) && incident.radiance != Vec3::ZERO {
                 let origin = offset_origin(s.surface.position, s.surface.ng, s.surface.magnitude);
@@ -82,27 +134,63 @@ impl ShadowRays {
                 self.rays.push(Ray { origin, direction });
                 self.ends.push(end);
                 self.lit.push((place as u32, incident));
+                if illum == 10 {
+                    s.sum.specular += unshadowed(&s.surface, &incident);
+                }
+            }
+        }
+    }
+
+    /// Traces them and adds what arrives.
+    fn trace<A: Aggregate>(
+        &mut self,
+        scene: &Scene<A>,
+        constants: Constants,
+        shadings: &mut [Shading],
+        counts: &mut RayCounts,
+    ) {
+        let Scene { aggregate, world, .. } = scene;
+        counts.shadow += self.rays.len() as u64;
+        if world.is_opaque {
+            self.occluded.resize(self.rays.len(), false);
+            aggregate.occluded_batch(&self.rays, &self.ends, &mut self.occluded);
+        }
+        for (ray, &(place, incident)) in self.lit.iter().enumerate() {
+            let s = &mut shadings[place as usize];
+            if world.is_opaque {
+                if !self.occluded[ray] {
+                    let reflected = reflect(&s.surface, constants.of(s), s.view, &incident);
+                    s.sum.diffuse += reflected.diffuse;
+                    s.sum.specular += reflected.specular;
+                }
+                continue;
+            }
+            let visibility = transmittance(*aggregate, world, &self.rays[ray], self.ends[ray]);
+            if visibility != Vec3::ZERO {
+                let reflected = reflect(&s.surface, constants.of(s), s.view, &incident);
+                s.sum.diffuse += reflected.diffuse * visibility;
+                s.sum.specular += reflected.specular * visibility;
             }
         }
     }
 }
 
-/// The share of light that comes along a shadow ray through surfaces that are not opaque: the product of their 1 − d
-/// in order; 0 after [`SURFACES_MAX`].
-fn transmittance<A: Aggregate>(aggregate: &A, world: &World, ray: &Ray, end: f32) -> f32 {
-    let mut share = 1.0;
+/// The share of light that comes along a shadow ray through surfaces that are not opaque: the product of what they let
+/// through, in order; 0 after [`SURFACES_MAX`].
+fn transmittance<A: Aggregate>(aggregate: &A, world: &World, ray: &Ray, end: f32) -> Vec3 {
+    let mut share = Vec3::ONE;
     let mut after: Option<HitOrder> = None;
     for _ in 0..SURFACES_MAX {
         match aggregate.closest(ray, after) {
             Some(hit) if hit.distance < end => {
-                share *= 1.0 - world.dissolve(&hit);
-                if share == 0.0 {
-                    return 0.0;
+                share *= world.shadow_factor(ray, &hit);
+                if share == Vec3::ZERO {
+                    return share;
                 }
                 after = Some(aggregate.order(&hit));
             }
             _ => return share,
         }
     }
-    0.0
+    Vec3::ZERO
 }

@@ -10,6 +10,8 @@ pub const POINT: u32 = 0;
 pub const DIRECTIONAL: u32 = 1;
 /// [`LightRecord::kind`] of a spot.
 pub const SPOT: u32 = 2;
+/// [`LightRecord::kind`] of the triangles that glow.
+pub const AREA: u32 = 3;
 
 /// A light, ready for shading.
 #[repr(C)]
@@ -17,7 +19,7 @@ pub const SPOT: u32 = 2;
 pub struct LightRecord {
     /// Where it stands; of a directional one the unit vector towards it.
     pub place: Vec3,
-    /// [`POINT`], [`DIRECTIONAL`] or [`SPOT`].
+    /// [`POINT`], [`DIRECTIONAL`], [`SPOT`] or [`AREA`].
     pub kind: u32,
     /// Colour × intensity, linear RGB.
     pub radiance: Vec3,
@@ -29,13 +31,15 @@ pub struct LightRecord {
     pub cos_inner: f32,
     /// Cosine of a spot's outer half angle.
     pub cos_outer: f32,
+    /// Points of an area light that each shading point looks at.
+    pub samples: u32,
     /// Fills the row of four.
-    pub pad: [u32; 3],
+    pub pad: [u32; 2],
 }
 
 impl LightRecord {
-    /// From a light as the job gives it; None of one that has no place or direction.
-    pub fn new(light: &Light) -> Option<Self> {
+    /// From a light as the job gives it.
+    pub fn new(light: &Light) -> Self {
         let unit = |v: Vec3| v.as_dvec3().normalize_or(DVec3::ZERO).as_vec3();
         let cos = |degrees: f32| libm::cos(f64::from(degrees).to_radians()) as f32;
         let weakens = |falloff: Falloff| u32::from(falloff == Falloff::InverseSquare);
@@ -61,9 +65,12 @@ impl LightRecord {
                 record.cos_inner = cos(inner_deg);
                 record.cos_outer = cos(outer_deg);
             }
-            Light::Area { .. } => return None,
+            Light::Area { samples } => {
+                record.kind = AREA;
+                record.samples = samples.max(1);
+            }
         }
-        Some(record)
+        record
     }
 
     /// From a shadow ray's origin to the light: the ray's direction, and the distance at which it ends, in units of
@@ -118,7 +125,6 @@ mod tests {
     fn point(falloff: Falloff) -> LightRecord {
         let color = Vec3::new(1.0, 0.5, 0.25);
         LightRecord::new(&Light::Point { position: Vec3::new(0.0, 4.0, 0.0), color, intensity: 2.0, falloff })
-            .unwrap()
     }
 
     #[test]
@@ -136,8 +142,7 @@ mod tests {
         let light = point(Falloff::None);
         assert_eq!(light.shadow_segment(Vec3::X), (Vec3::new(-1.0, 4.0, 0.0), 1.0));
         let direction = Vec3::new(0.0, -3.0, 0.0);
-        let sun =
-            LightRecord::new(&Light::Directional { direction, color: Vec3::ONE, intensity: 0.5 }).unwrap();
+        let sun = LightRecord::new(&Light::Directional { direction, color: Vec3::ONE, intensity: 0.5 });
         assert_eq!(sun.shadow_segment(Vec3::X), (Vec3::Y, f32::INFINITY));
         assert_eq!(incident(&sun, Vec3::X), Incident { direction: Vec3::Y, radiance: Vec3::splat(0.5) });
     }
@@ -154,7 +159,6 @@ mod tests {
                 intensity: 1.0,
                 falloff: Falloff::None,
             })
-            .unwrap()
         };
         // a point on the floor at angle a from the axis lies at tan a
         let share = |light, degrees: f32| incident(&light, Vec3::X * degrees.to_radians().tan()).radiance.x;

@@ -25,10 +25,11 @@ pub fn unit_square(index: u32, pixel: [u32; 2], seed: u32) -> [f32; 2] {
     [unit(owen_scramble(x, hash(pixel_seed))), unit(owen_scramble(y, hash(pixel_seed ^ 1)))]
 }
 
-/// Point `index` of one of a pixel's further sequences; dimension 0 is that of [`unit_square`].
-pub fn unit_square_of(index: u32, pixel: [u32; 2], seed: u32, dimension: u32) -> [f32; 2] {
-    // another seed for each dimension, so that what is paired is not correlated
-    unit_square(index, pixel, hash(seed ^ hash(dimension)))
+/// As [`unit_square`], for a purpose other than the place in the pixel: the same points in another order and scrambled
+/// anew, so that purposes do not follow one another (Burley, section 5).
+pub fn unit_square_for(purpose: u32, index: u32, pixel: [u32; 2], seed: u32) -> [f32; 2] {
+    let seed = hash(seed ^ hash(purpose ^ 0x5bd1_e995));
+    unit_square(owen_scramble(index, hash(pixel[0] ^ hash(pixel[1] ^ seed))), pixel, seed)
 }
 
 /// Warps [0, 1)² by the filter's inverse cumulative distribution, separately in x and y.
@@ -105,7 +106,7 @@ fn owen_scramble(x: u32, seed: u32) -> u32 {
 }
 
 /// The finaliser of `MurmurHash3`, moved off its fixed point 0.
-fn hash(x: u32) -> u32 {
+pub(super) fn hash(x: u32) -> u32 {
     let x = x.wrapping_add(0x9e37_79b9);
     let x = (x ^ x >> 16).wrapping_mul(0x85eb_ca6b);
     let x = (x ^ x >> 13).wrapping_mul(0xc2b2_ae35);

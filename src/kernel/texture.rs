@@ -1,243 +1,174 @@
-//! Texels: trilinear lookup with a level by the footprint, in linear numbers.
+//! Texels: decoding, bilinear within a level, linear between levels.
 
-use crate::film::color;
-use crate::math::{Vec2, Vec3};
-use crate::scene::{Channel, Map, TexelSpace, Texels, Texture};
-use std::sync::OnceLock;
+use super::power::powf;
+use crate::math::Vec4;
+use crate::scene::{Map, TexelSpace, Texels, Texture};
+use std::sync::LazyLock;
 
-/// The texel of a map at (u, v) in linear numbers, RGBA; `footprint` is the width of what is seen in units of u and v
-/// times the size of level 0, so that 1 is a texel; 0 for level 0.
-pub fn lookup(map: &Map, uv: Vec2, footprint: f32) -> [f32; 4] {
-    let texture = &*map.texture;
-    let uv = place(map, uv);
-    let top = (texture.levels() - 1) as f32;
-    let level = if footprint > 1.0 { libm::log2f(footprint).min(top) } else { 0.0 };
+/// A texture at (u, v), v running up, at a level of any value; repeated or clamped. RGBA, linear.
+pub fn trilinear(texture: &Texture, [u, v]: [f32; 2], level: f32, clamp: bool) -> Vec4 {
+    let level = level.clamp(0.0, (texture.levels() - 1) as f32);
     let lower = level.floor();
-    let a = bilinear(texture, lower as u32, uv, map.clamp);
-    let texel = if level > lower {
-        let b = bilinear(texture, lower as u32 + 1, uv, map.clamp);
-        std::array::from_fn(|k| a[k] + (b[k] - a[k]) * (level - lower))
-    } else {
-        a
-    };
-    let [base, gain] = map.base_gain;
-    std::array::from_fn(|k| texel[k] * gain + base)
+    let at = |level: f32| bilinear(texture, [u, v], level as u32, clamp);
+    let share = level - lower;
+    if share == 0.0 { at(lower) } else { at(lower) * (1.0 - share) + at(lower + 1.0) * share }
 }
 
-/// (u, v) after the map's factors and offsets.
-fn place(map: &Map, uv: Vec2) -> Vec2 {
-    let placed = uv * Vec2::from(map.scale) + Vec2::from(map.offset);
-    if placed.is_finite() { placed } else { Vec2::ZERO }
-}
-
-/// The colour of a map.
-pub fn color_of(map: &Map, uv: Vec2, footprint: f32) -> Vec3 {
-    let [r, g, b, _] = lookup(map, uv, footprint);
-    Vec3::new(r, g, b)
-}
-
-/// The number of a map: its channel, else the luminance (Rec. 709).
-pub fn number_of(map: &Map, uv: Vec2, footprint: f32) -> f32 {
-    pick(lookup(map, uv, footprint), map.channel.unwrap_or(Channel::Luminance))
-}
-
-/// The dissolve of a map: its channel, else alpha where that varies, else the luminance.
-pub fn dissolve_of(map: &Map, uv: Vec2, footprint: f32) -> f32 {
-    let otherwise = if map.texture.alpha_varies { Channel::Alpha } else { Channel::Luminance };
-    pick(lookup(map, uv, footprint), map.channel.unwrap_or(otherwise))
-}
-
-fn pick(texel: [f32; 4], channel: Channel) -> f32 {
-    let [r, g, b, a] = texel;
-    match channel {
-        Channel::R => r,
-        Channel::G => g,
-        Channel::B => b,
-        Channel::Alpha => a,
-        Channel::Luminance => color::luma([r, g, b]),
-    }
-}
-
-/// Slopes of a height map along u and v, from texel to texel of the level: (h(+1) − h(−1))/2.
-pub fn slopes(map: &Map, uv: Vec2, footprint: f32) -> Vec2 {
-    let [width, height] = map.texture.size.map(|s| s as f32);
-    let texels = footprint.max(1.0);
-    let step = |axis: Vec2| axis * texels / (Vec2::new(width, height) * Vec2::from(map.scale));
-    let h = |d: Vec2| number_of(map, uv + d, footprint);
-    let (du, dv) = (step(Vec2::X), step(Vec2::Y));
-    0.5 * Vec2::new(h(du) - h(-du), h(dv) - h(-dv))
-}
-
-/// Between the four nearest texels of a level; v runs up, rows run down.
-fn bilinear(texture: &Texture, level: u32, uv: Vec2, clamp: bool) -> [f32; 4] {
-    let [width, height] = texture.level_size(level);
-    let x = uv.x * width as f32 - 0.5;
-    let y = (1.0 - uv.y) * height as f32 - 0.5;
-    let (x0, y0) = (x.floor(), y.floor());
-    let (fx, fy) = (x - x0, y - y0);
+/// A texture at (u, v) within a level: texels lie at the middle of their squares.
+pub fn bilinear(texture: &Texture, uv: [f32; 2], level: u32, clamp: bool) -> Vec4 {
+    let size = texture.level_size(level);
     let first = first_texel(texture, level);
-    let at = |x: f32, y: f32| {
-        let column = wrap(x, width, clamp) as usize;
-        let row = wrap(y, height, clamp) as usize;
-        texel(texture, first + row * width as usize + column)
-    };
-    let (a, b) = (at(x0, y0), at(x0 + 1.0, y0));
-    let (c, d) = (at(x0, y0 + 1.0), at(x0 + 1.0, y0 + 1.0));
-    std::array::from_fn(|k| {
-        let upper = a[k] + (b[k] - a[k]) * fx;
-        let lower = c[k] + (d[k] - c[k]) * fx;
-        upper + (lower - upper) * fy
-    })
+    let [column, row] = [axis(uv[0], size[0], clamp), axis(1.0 - uv[1], size[1], clamp)];
+    let at = |x: u32, y: u32| texel(texture, first + y as usize * size[0] as usize + x as usize);
+    let along = |y: u32| at(column.low, y) * (1.0 - column.share) + at(column.high, y) * column.share;
+    along(row.low) * (1.0 - row.share) + along(row.high) * row.share
 }
 
-/// A column or row within the level: the border's, or that of the repeated texture. What is not finite is 0.
-fn wrap(x: f32, size: u32, clamp: bool) -> u32 {
-    let last = size - 1;
-    if clamp {
-        return (x.max(0.0) as u32).min(last);
-    }
-    let size = size as f32;
-    let within = x - size * (x / size).floor();
-    (within.max(0.0) as u32).min(last)
+/// A map at texture coordinates: its scale and offset before, its base and gain after.
+pub fn map_at(map: &Map, uv: [f32; 2], level: f32) -> Vec4 {
+    let [base, gain] = map.base_gain;
+    trilinear(&map.texture, map_coordinates(map, uv), level, map.clamp) * gain + base
 }
 
+/// As [`map_at`] at level 0, clamped whatever the map says.
+pub fn map_clamped_at(map: &Map, uv: [f32; 2]) -> Vec4 {
+    let [base, gain] = map.base_gain;
+    trilinear(&map.texture, map_coordinates(map, uv), 0.0, true) * gain + base
+}
+
+/// Texture coordinates scaled and moved as the map wants.
+pub fn map_coordinates(map: &Map, uv: [f32; 2]) -> [f32; 2] {
+    [0, 1].map(|k| uv[k] * map.scale[k] + map.offset[k])
+}
+
+/// Two texels beside each other, and how much the second counts for.
+struct Axis {
+    low: u32,
+    high: u32,
+    share: f32,
+}
+
+fn axis(u: f32, size: u32, clamp: bool) -> Axis {
+    let u = if clamp { u.clamp(0.0, 1.0) } else { u - u.floor() };
+    let x = u * size as f32 - 0.5;
+    let floor = x.floor();
+    // what is not a number becomes 0
+    let (low, share) = (floor as i64, if floor.is_finite() { x - floor } else { 0.0 });
+    let last = i64::from(size) - 1;
+    let place = |i: i64| if clamp { i.clamp(0, last) } else { i.rem_euclid(last + 1) } as u32;
+    Axis { low: place(low), high: place(low + 1), share }
+}
+
+/// The place of a level's first texel.
 fn first_texel(texture: &Texture, level: u32) -> usize {
-    (0..level).map(|l| texture.level_size(l)).map(|[w, h]| w as usize * h as usize).sum()
+    (0..level).map(|l| texture.level_size(l).map(|s| s as usize)).map(|[w, h]| w * h).sum()
 }
 
-/// A texel in linear numbers; one that is not there is black.
-fn texel(texture: &Texture, index: usize) -> [f32; 4] {
+/// A texel, linear; black beyond the last.
+fn texel(texture: &Texture, place: usize) -> Vec4 {
     match &texture.texels {
-        Texels::F32(t) => t.get(index).copied().unwrap_or_default(),
-        Texels::U8(t) => {
-            let [r, g, b, a] = t.get(index).copied().unwrap_or_default();
-            let share = |x: u8| f32::from(x) / 255.0;
-            match texture.space {
-                TexelSpace::Linear => [share(r), share(g), share(b), share(a)],
-                TexelSpace::Srgb => {
-                    let table = linear_from_srgb8();
-                    [table[r as usize], table[g as usize], table[b as usize], share(a)]
-                }
-            }
+        Texels::F32(texels) => texels.get(place).map_or(Vec4::ZERO, |&t| t.into()),
+        Texels::U8(texels) => {
+            let Some(&[r, g, b, a]) = texels.get(place) else { return Vec4::ZERO };
+            let of = |x: u8| match texture.space {
+                TexelSpace::Srgb => LINEAR_FROM_SRGB[usize::from(x)],
+                TexelSpace::Linear => f32::from(x) / 255.0,
+            };
+            Vec4::new(of(r), of(g), of(b), f32::from(a) / 255.0)
         }
     }
 }
 
-fn linear_from_srgb8() -> &'static [f32; 256] {
-    static TABLE: OnceLock<[f32; 256]> = OnceLock::new();
-    TABLE.get_or_init(|| std::array::from_fn(|i| color::linear_from_srgb(i as f64 / 255.0) as f32))
-}
+/// IEC 61966-2-1 of the 256 shares.
+static LINEAR_FROM_SRGB: LazyLock<[f32; 256]> =
+    LazyLock::new(|| std::array::from_fn(|i| linear_from_srgb(i as f32 / 255.0)));
 
-/// A latitude-longitude picture in a direction (unit): its middle is at −z, its top at +y.
-pub fn sphere(map: &Map, direction: Vec3) -> Vec3 {
-    let [x, y, z] = direction.to_array().map(f64::from);
-    let u = 0.5 + libm::atan2(x, -z) / std::f64::consts::TAU;
-    let v = 0.5 + libm::asin(y.clamp(-1.0, 1.0)) / std::f64::consts::PI;
-    // around it repeats, above and below it ends
-    let half_texel = 0.5 / map.texture.size[1] as f32;
-    color_of(map, Vec2::new(u as f32, (v as f32).clamp(half_texel, 1.0 - half_texel)), 0.0)
-}
-
-/// A cube of pictures in a direction: faces −x, +x, −y, +y, −z, +z as seen from inside; a missing one is black.
-pub fn cube(faces: &[Option<Map>; 6], direction: Vec3) -> Vec3 {
-    let size = direction.abs();
-    let axis = if size.x >= size.y && size.x >= size.z { 0 } else { 1 + usize::from(size.y < size.z) };
-    let positive = direction[axis] > 0.0;
-    let d = direction / size[axis];
-    // right and up on each face, for an eye in the middle whose up is +y (−z ahead for the faces above and below)
-    let (right, up) = match (axis, positive) {
-        (0, false) => (-d.z, d.y),
-        (0, true) => (d.z, d.y),
-        (1, false) => (d.x, -d.z),
-        (1, true) => (d.x, d.z),
-        (_, false) => (d.x, d.y),
-        (_, true) => (-d.x, d.y),
-    };
-    let uv = Vec2::new(0.5 + 0.5 * right, 0.5 + 0.5 * up);
-    faces[2 * axis + usize::from(positive)].as_ref().map_or(Vec3::ZERO, |map| color_of(map, uv, 0.0))
+/// IEC 61966-2-1.
+pub fn linear_from_srgb(x: f32) -> f32 {
+    if x <= 0.04045 { x / 12.92 } else { powf((x + 0.055) / 1.055, 2.4) }
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
     use crate::scene::Part;
 
-    /// Four texels and their mean: 0 and 100 above, 200 and 40 below.
-    fn map(clamp: bool) -> Map {
-        let gray = |g: u8| [g, g, g, 255];
-        let texels = Texels::U8(vec![gray(0), gray(100), gray(200), gray(40), gray(85)]);
-        let texture = Texture { size: [2, 2], space: TexelSpace::Linear, alpha_varies: false, texels };
+    /// A texture of one channel, the levels one after the other.
+    pub(crate) fn grey(size: [u32; 2], texels: &[f32]) -> Texture {
+        let texels = texels.iter().map(|&x| [x, x, x, 1.0]).collect();
+        Texture { size, space: TexelSpace::Linear, alpha_varies: false, texels: Texels::F32(texels) }
+    }
+
+    pub(crate) fn map(texture: Texture) -> Map {
         Map {
             texture: Part::new(texture),
             scale: [1.0; 2],
             offset: [0.0; 2],
-            clamp,
+            clamp: false,
             base_gain: [0.0, 1.0],
             bump_multiplier: 1.0,
             channel: None,
         }
     }
 
-    fn at(map: &Map, u: f32, v: f32, footprint: f32) -> f32 {
-        255.0 * number_of(map, Vec2::new(u, v), footprint)
+    /// Four by two texels, the upper row 0 1 2 3, the lower 4 5 6 7; then 2.5 4.5; then 3.5.
+    fn ramp() -> Texture {
+        grey([4, 2], &[0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 2.5, 4.5, 3.5])
     }
 
-    fn close(a: f32, b: f32) -> bool {
-        (a - b).abs() < 1e-3
-    }
-
-    #[test]
-    fn texels_have_their_centres_and_v_runs_up() {
-        let m = map(true);
-        assert!(close(at(&m, 0.25, 0.75, 0.0), 0.0) && close(at(&m, 0.75, 0.75, 0.0), 100.0));
-        assert!(close(at(&m, 0.25, 0.25, 0.0), 200.0) && close(at(&m, 0.75, 0.25, 0.0), 40.0));
-        // a quarter of the way from 0 to 100, and the middle of all four
-        assert!(close(at(&m, 0.375, 0.75, 0.0), 25.0));
-        assert!(close(at(&m, 0.5, 0.5, 0.0), 85.0));
+    fn at(uv: [f32; 2], level: f32, clamp: bool) -> f32 {
+        trilinear(&ramp(), uv, level, clamp).x
     }
 
     #[test]
-    fn outside_it_repeats_or_stays_at_the_border() {
-        let (repeat, clamp) = (map(false), map(true));
-        assert!(close(at(&repeat, 1.25, 0.75, 0.0), 0.0) && close(at(&clamp, 1.25, 0.75, 0.0), 100.0));
-        assert!(close(at(&repeat, -0.25, 0.75, 0.0), 100.0) && close(at(&clamp, -7.0, 0.75, 0.0), 0.0));
-        // between the last and the first column
-        assert!(close(at(&repeat, 0.0, 0.75, 0.0), 50.0));
-        assert!(at(&repeat, f32::NAN, f32::INFINITY, 0.0).is_finite());
+    fn texels_lie_in_the_middle_of_their_squares_and_v_runs_up() {
+        // upper row: v = 3/4; columns at (k + 1/2)/4
+        assert_eq!((at([0.125, 0.75], 0.0, false), at([0.875, 0.75], 0.0, false)), (0.0, 3.0));
+        assert_eq!((at([0.125, 0.25], 0.0, false), at([0.625, 0.25], 0.0, true)), (4.0, 6.0));
+        // a quarter of the way from column 1 to 2 and halfway between the rows: 1.25 + 2
+        assert_eq!(at([0.4375, 0.5], 0.0, false), 3.25);
     }
 
     #[test]
-    fn levels_are_mixed_by_the_footprint() {
-        let m = map(true);
-        assert!(close(at(&m, 0.25, 0.75, 2.0), 85.0) && close(at(&m, 0.25, 0.75, 1e9), 85.0));
-        // level ½: half of each
-        assert!(close(at(&m, 0.25, 0.75, 2f32.sqrt()), 42.5));
+    fn outside_it_repeats_or_keeps_the_border() {
+        // at u = 0 halfway between the last and the first column: (3 + 0)/2; clamped the first
+        assert_eq!((at([0.0, 0.75], 0.0, false), at([0.0, 0.75], 0.0, true)), (1.5, 0.0));
+        assert_eq!((at([3.125, -0.25], 0.0, false), at([-4.0, 9.0], 0.0, true)), (0.0, 0.0));
+        // at v = 1 halfway between the lower and the upper row
+        assert_eq!(at([0.125, 1.0], 0.0, false), 2.0);
+        assert!(at([f32::NAN, f32::INFINITY], 0.0, false).is_finite());
     }
 
     #[test]
-    fn options_and_channels() {
-        let mut m = map(true);
-        m.base_gain = [0.1, 0.5];
-        assert!(close(at(&m, 0.75, 0.75, 0.0), 25.5 + 50.0));
-        let m = Map { scale: [2.0, 1.0], offset: [-0.5, 0.0], ..map(true) };
-        assert!(close(at(&m, 0.625, 0.75, 0.0), 100.0));
-        let m = Map { channel: Some(Channel::Alpha), ..map(true) };
-        assert!(close(at(&m, 0.25, 0.75, 0.0), 255.0));
-        // from the left column to the right one the heights above rise by 100, half of it a texel on either side
-        let slope = slopes(&map(true), Vec2::new(0.5, 0.75), 0.0) * 255.0;
-        assert!(close(slope.x, 0.5 * (100.0 - 0.0)), "{slope}");
+    fn between_levels_it_is_linear() {
+        // level 1 at the middle of its first texel: 2.5; level 0 there, (0.25, 0.5): 0.5 + 2 = 2.5
+        assert_eq!(at([0.25, 0.5], 1.0, false), 2.5);
+        // at (0.125, 0.75): level 0 is 0, level 1 a quarter of the way from 2.5 back to 4.5: 3
+        assert_eq!(at([0.125, 0.75], 0.25, false), 0.75);
+        assert_eq!((at([0.1, 0.9], 2.0, false), at([0.1, 0.9], 99.0, false)), (3.5, 3.5));
+        assert_eq!(at([0.125, 0.75], -3.0, false), 0.0);
     }
 
     #[test]
-    fn a_sphere_and_a_cube_around() {
-        let m = map(false);
-        // straight ahead is the middle of the picture
-        assert!((255.0 * sphere(&m, Vec3::NEG_Z).x - 85.0).abs() < 1e-3);
-        let faces = std::array::from_fn(|i| (i == 1).then(|| map(true)));
-        assert!(
-            (255.0 * cube(&faces, Vec3::new(1.0, 0.5, -0.5)).x - 0.0).abs() < 1e-3,
-            "left and up on the face ahead of +x"
-        );
-        assert_eq!(cube(&faces, Vec3::NEG_X), Vec3::ZERO);
+    fn options_act_on_coordinates_and_values() {
+        let mut m = map(ramp());
+        (m.scale, m.offset, m.base_gain) = ([2.0, 1.0], [0.125, 0.5], [0.5, 2.0]);
+        // (0.25, 0.25) becomes (0.625, 0.75): 2, then 2 · 2 + 0.5
+        assert_eq!(map_at(&m, [0.25, 0.25], 0.0).x, 4.5);
+    }
+
+    #[test]
+    fn eight_bits_are_decoded_by_their_curve() {
+        let texture = |space| Texture {
+            size: [1, 1],
+            space,
+            alpha_varies: true,
+            texels: Texels::U8(vec![[255, 128, 0, 51]]),
+        };
+        let srgb = trilinear(&texture(TexelSpace::Srgb), [0.5; 2], 0.0, false);
+        // sRGB 128/255 is 0.215861
+        assert!((srgb - Vec4::new(1.0, 0.215_861, 0.0, 0.2)).length() < 1e-6, "{srgb}");
+        let linear = trilinear(&texture(TexelSpace::Linear), [0.5; 2], 0.0, false);
+        assert_eq!(linear, Vec4::new(1.0, 128.0 / 255.0, 0.0, 0.2));
     }
 }

@@ -1,97 +1,42 @@
 //! A tile of the picture: camera rays, the surfaces they meet, light, and on through what is transparent; many rays
 //! at a time, so that neighbours share what they touch. What a pixel becomes depends on no other pixel.
 
-use super::area::{AreaLight, AreaSample};
+use super::RayCounts;
 use super::band::FilmBand;
-use super::camera::{CameraConstants, camera_ray};
+use super::branch::{Border, Branches, Visit};
+use super::camera::camera_ray;
 use super::center::fill_center;
-use super::direct::{Shading, ShadowRays, add_lights};
-use super::light::LightRecord;
-use super::path::Walk;
+use super::direct::{Constants, Sample, Shading, ShadowRays, add_lights};
+use super::material::{HALO, MaterialRecord, TEXTURED};
+use super::optics::reflectance_upright;
+use super::path::{Path, PixelSum};
 use super::sampler::place_in_pixel;
+use super::scene::Scene;
 use super::shade::{Reflected, color};
-use super::world::World;
-use super::{RayCounts, SURFACES_MAX};
 use crate::accel::{Aggregate, Hit, Ray};
 use crate::math::Vec3;
-use crate::scene::{Background, Frame, Light, Shot};
+use crate::scene::Shot;
 use std::ops::Range;
-
-/// Everything that a frame's tiles have in common.
-#[derive(Debug)]
-pub struct Scene<'a, A> {
-    /// What rays are traced against: the triangles of the frame.
-    pub aggregate: &'a A,
-    /// The surfaces of the frame.
-    pub world: World<'a>,
-    /// The camera.
-    pub camera: CameraConstants,
-    /// The lights in the order given.
-    pub lights: Vec<LightRecord>,
-    /// The triangles that glow, where the job lets them light the scene.
-    pub area: Option<AreaLight>,
-    /// The rest.
-    pub shot: &'a Shot,
-}
-
-impl<'a, A: Aggregate> Scene<'a, A> {
-    /// Takes a frame, what its rays are traced against, and a shot.
-    pub fn new(aggregate: &'a A, frame: &'a Frame, shot: &'a Shot) -> Self {
-        let world = World::new(frame);
-        let samples = shot
-            .lights
-            .iter()
-            .find_map(|l| if let Light::Area { samples } = l { Some(*samples) } else { None });
-        Self {
-            aggregate,
-            area: samples.and_then(|samples| AreaLight::new(&world, samples)),
-            world,
-            camera: CameraConstants::new(&shot.camera, shot.size),
-            lights: shot.lights.iter().filter_map(LightRecord::new).collect(),
-            shot,
-        }
-    }
-
-    /// Whether surfaces need nothing but lights at points and what is straight on behind them.
-    fn is_direct(&self) -> bool {
-        self.world.is_direct && self.area.is_none() && matches!(self.shot.background, Background::Color(_))
-    }
-}
-
-/// Sums over a pixel's samples.
-#[derive(Clone, Copy, Debug, Default)]
-struct PixelSum {
-    rgb: Vec3,
-    albedo: Vec3,
-    /// What the background counts for.
-    through: f32,
-}
-
-/// A camera ray at a surface.
-#[derive(Clone, Copy, Debug)]
-struct Path {
-    pixel: u32,
-    hit: Hit,
-    /// What is seen there counts for this.
-    weight: f32,
-    /// Whether no surface before it had d > 0.
-    sees_first: bool,
-}
 
 /// Room for a tile's rays, kept from tile to tile.
 #[derive(Debug, Default)]
 pub struct TileBuffers {
     /// (column, row in the band).
     pixels: Vec<[u32; 2]>,
+    /// The ray of each pixel's path.
     rays: Vec<Ray>,
     hits: Vec<Option<Hit>>,
     sums: Vec<PixelSum>,
     paths: Vec<Path>,
     shadings: Vec<Shading>,
+    /// Constants of materials that are those of one shading point only.
+    own_constants: Vec<MaterialRecord>,
+    /// For each pixel; empty where no material is of a model beyond 2.
+    branches: Vec<Branches>,
     shadow: ShadowRays,
 }
 
-/// Traces the given columns of a band. Asks `stopped` before each sample of its pixels; None where it said yes, and
+/// Traces the given columns of a band. Asks `stopped` at each step of its paths; None where it said yes, and
 /// the band's pixels are then not to be used.
 pub fn trace_tile<A: Aggregate>(
     scene: &Scene<A>,
@@ -113,10 +58,18 @@ pub fn trace_tile<A: Aggregate>(
             place_in_pixel(scene.shot.filter, sample, samples, pixel, scene.shot.seed)
         });
         buffers.trace(scene, &mut counts);
-        if scene.is_direct() {
-            buffers.follow(scene, &mut counts);
-        } else {
-            buffers.walk(scene, band, sample, &mut counts);
+        buffers.start(scene);
+        for step in 0.. {
+            if buffers.paths.is_empty() {
+                break;
+            }
+            if stopped() {
+                return None;
+            }
+            buffers.meet(scene);
+            buffers.light(scene, band.first_row, sample, step, &mut counts);
+            buffers.settle(scene, &mut counts);
+            buffers.go_on(scene);
         }
     }
     if band.wants_center() {
@@ -124,11 +77,14 @@ pub fn trace_tile<A: Aggregate>(
             buffers.aim(scene, band, |_| [0.5; 2]);
             buffers.trace(scene, &mut counts);
         }
-        fill_center(scene.aggregate, &scene.world, band, &buffers.pixels, &buffers.rays, &buffers.hits);
+        fill_center(scene, band, &buffers.pixels, &buffers.rays, &buffers.hits);
     }
     buffers.store(scene.shot, band);
     Some(counts)
 }
+
+/// The hit of a path that meets nothing.
+const NOWHERE: Hit = Hit { distance: f32::INFINITY, object: 0, triangle: 0, barycentric: [0.0; 2] };
 
 /// A side of the blocks that a tile's pixels are ordered by, so that rays side by side are close.
 const BLOCK: u32 = 4;
@@ -166,92 +122,109 @@ impl TileBuffers {
         counts.camera += self.rays.len() as u64;
     }
 
-    /// Adds what the camera rays see, one after the other with all that follows from each.
-    fn walk<A: Aggregate>(&mut self, scene: &Scene<A>, band: &FilmBand, index: u32, counts: &mut RayCounts) {
-        for (i, &[x, row]) in self.pixels.iter().enumerate() {
-            let sample =
-                AreaSample { pixel: [x, band.first_row + row], index, seed: scene.shot.seed, surface: 0 };
-            let seen = Walk { scene, sample, counts }.camera(self.rays[i], self.hits[i]);
-            let sum = &mut self.sums[i];
-            sum.rgb += seen.rgb;
-            sum.through += seen.through;
-            sum.albedo += seen.albedo;
-        }
-    }
-
-    /// Adds what the camera rays see, surface after surface.
-    fn follow<A: Aggregate>(&mut self, scene: &Scene<A>, counts: &mut RayCounts) {
+    /// The paths of one sample begin.
+    fn start<A>(&mut self, scene: &Scene<A>) {
         self.paths.clear();
         for (pixel, hit) in (0..).zip(&self.hits) {
+            let path = |hit| Path::new(pixel, hit);
             match *hit {
-                Some(hit) => self.paths.push(Path { pixel, hit, weight: 1.0, sees_first: true }),
-                None => self.sums[pixel as usize].escape(scene.shot, 1.0),
+                Some(hit) => self.paths.push(path(hit)),
+                None => {
+                    self.sums[pixel as usize].escape(scene.shot, &path(NOWHERE), &self.rays[pixel as usize]);
+                }
             }
         }
-        for _ in 0..SURFACES_MAX {
-            if self.paths.is_empty() {
-                break;
-            }
-            self.meet(&scene.world);
-            add_lights(
-                scene.aggregate,
-                &scene.world,
-                &scene.lights,
-                &mut self.shadings,
-                &mut self.shadow,
-                counts,
-            );
-            self.add_colors(&scene.world, scene.shot.ambient);
-            self.go_straight_on(scene);
+        if scene.world.has_models_beyond_2 {
+            self.branches.resize(self.pixels.len(), Branches::default());
+            self.branches.iter_mut().for_each(Branches::start);
         }
     }
 
     /// Looks up the surfaces that the paths are at; what they let through remains as the paths' weight.
-    fn meet(&mut self, world: &World) {
+    fn meet<A>(&mut self, scene: &Scene<A>) {
+        let world = &scene.world;
         self.shadings.clear();
-        for path in &mut self.paths {
-            let ray = &self.rays[path.pixel as usize];
-            let d = world.dissolve(&path.hit);
-            if d > 0.0 {
-                let surface = world.surface(ray, &path.hit);
-                if path.sees_first {
-                    self.sums[path.pixel as usize].albedo += surface.kd;
-                    path.sees_first = false;
+        self.own_constants.clear();
+        for (place, path) in (0..).zip(&mut self.paths) {
+            let pixel = path.pixel as usize;
+            let ray = &self.rays[pixel];
+            let material = world.material(&path.hit);
+            let mut m = &world.materials[material as usize];
+            if m.cover() == 0.0 && !m.is(TEXTURED) {
+                continue;
+            }
+            let mut surface = world.surface(ray, &path.hit, material);
+            let mut constants = material;
+            if m.is(TEXTURED | HALO) || m.illum == 7 && m.ks == Vec3::ZERO {
+                let width = scene.spread * (path.travelled + path.hit.distance);
+                let mut own = world.changed(ray, &path.hit, &mut surface, width).unwrap_or(*m);
+                if own.illum == 7 && own.ks == Vec3::ZERO {
+                    let border = Border::new(world, &self.branches[pixel].media, &surface);
+                    own.ks = Vec3::splat(reflectance_upright(border.n1, border.n2));
                 }
-                self.shadings.push(Shading {
-                    pixel: path.pixel,
-                    weight: path.weight * d,
-                    surface,
-                    view: -ray.direction,
-                    sum: Reflected::default(),
-                });
+                constants = (world.materials.len() + self.own_constants.len()) as u32;
+                self.own_constants.push(own);
+                m = &self.own_constants[self.own_constants.len() - 1];
             }
-            path.weight *= 1.0 - d;
+            if path.sees_first && m.d > 0.0 {
+                self.sums[pixel].albedo += surface.kd;
+                path.sees_first = false;
+            }
+            let cover = m.cover();
+            self.shadings.push(Shading {
+                path: place,
+                pixel: path.pixel,
+                weight: path.weight * cover,
+                surface,
+                constants,
+                view: -ray.direction,
+                sum: Reflected::default(),
+            });
+            path.weight *= 1.0 - cover;
         }
     }
 
-    fn add_colors(&mut self, world: &World, ambient: Vec3) {
-        for s in &self.shadings {
-            let material = &world.materials[s.surface.material as usize];
-            self.sums[s.pixel as usize].rgb += color(&s.surface, material, ambient, &s.sum) * s.weight;
-        }
+    /// Adds up the lights on the surfaces.
+    fn light<A: Aggregate>(
+        &mut self,
+        scene: &Scene<A>,
+        first_row: u32,
+        index: u32,
+        step: u32,
+        counts: &mut RayCounts,
+    ) {
+        let constants = Constants { all: &scene.world.materials, own: &self.own_constants };
+        let sample = Sample { pixels: &self.pixels, first_row, index, step };
+        add_lights(scene, constants, sample, &mut self.shadings, &mut self.shadow, counts);
     }
 
-    /// Takes the paths that count for something to their next surface or the background.
-    fn go_straight_on<A: Aggregate>(&mut self, scene: &Scene<A>) {
-        let Self { paths, rays, sums, .. } = self;
-        paths.retain_mut(|path| {
-            if path.weight == 0.0 || path.weight < scene.shot.prune {
-                return false;
-            }
-            let after = scene.aggregate.order(&path.hit);
-            let next = scene.aggregate.closest(&rays[path.pixel as usize], Some(after));
-            if let Some(hit) = next {
-                path.hit = hit;
+    /// Adds what the surfaces show.
+    fn settle<A>(&mut self, scene: &Scene<A>, counts: &mut RayCounts) {
+        let constants = Constants { all: &scene.world.materials, own: &self.own_constants };
+        for shading in &self.shadings {
+            let m = constants.of(shading);
+            let pixel = shading.pixel as usize;
+            let sum = &mut self.sums[pixel];
+            if m.illum > 2 {
+                let visit = Visit { scene, shading, constants: m, ray: &self.rays[pixel] };
+                let path = &mut self.paths[shading.path as usize];
+                self.branches[pixel].settle(&visit, path, sum, counts);
             } else {
-                sums[path.pixel as usize].escape(scene.shot, path.weight);
+                sum.rgb += color(&shading.surface, m, scene.shot.ambient, &shading.sum) * shading.weight;
             }
-            next.is_some()
+        }
+    }
+
+    /// Takes the paths to their next surfaces; those that find none end.
+    fn go_on<A: Aggregate>(&mut self, scene: &Scene<A>) {
+        let Self { paths, rays, sums, branches, .. } = self;
+        paths.retain_mut(|path| {
+            let pixel = path.pixel as usize;
+            let (ray, sum) = (&mut rays[pixel], &mut sums[pixel]);
+            match branches.get_mut(pixel) {
+                Some(branches) => branches.go_on(scene, ray, path, sum),
+                None => path.go_straight_on(scene, ray, Vec3::ONE, sum),
+            }
         });
     }
 
@@ -264,21 +237,12 @@ impl TileBuffers {
             if let Some(alpha) = &mut band.alpha {
                 alpha[place] = 1.0 - sum.through / samples;
             }
+            if let Some(coverage) = &mut band.coverage {
+                coverage[place] = 1.0 - sum.through / samples;
+            }
             if let Some(albedo) = &mut band.albedo {
                 albedo[place] = (sum.albedo / samples).into();
             }
-        }
-    }
-}
-
-impl PixelSum {
-    /// A path that counts for `weight` leaves the scene. With alpha the background adds no colour.
-    fn escape(&mut self, shot: &Shot, weight: f32) {
-        self.through += weight;
-        if let Background::Color(color) = shot.background
-            && !shot.alpha
-        {
-            self.rgb += color * weight;
         }
     }
 }

@@ -1,11 +1,13 @@
 //! A frame as the kernel reads it: slices into its parts, constants of materials, transforms rounded to f32; and the
 //! surfaces that rays meet in it.
 
-use super::material::MaterialRecord;
-use super::power::powf;
+use super::maps::{MapPoint, textured, tilted};
+use super::material::{HALO, MaterialRecord, TEXTURED, TEXTURED_SHADOW};
+use super::texture::linear_from_srgb;
 use crate::accel::{Aabb, Hit, Placement, Ray, extent, hit_point, magnitude};
-use crate::math::{DAffine3, DMat3, Mat3, Vec2, Vec3};
-use crate::scene::{ABSENT, Frame, Geometry, Material, Object, Part, Reflection, Textures};
+use crate::math::{DAffine3, DMat3, Mat3, Vec3};
+use crate::scene::{ABSENT, Frame, Geometry, Material, Object, PartHash, Textures};
+use std::collections::HashMap;
 
 /// What a ray meets at a hit.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -22,7 +24,7 @@ pub struct Surface {
     pub kd: Vec3,
     /// The material's place in [`World::materials`].
     pub material: u32,
-    /// Whether the ray meets the side that the corners go round counter-clockwise.
+    /// Whether the viewer is on the side that the triangle's normal points to.
     pub is_front: bool,
 }
 
@@ -30,20 +32,23 @@ pub struct Surface {
 #[derive(Clone, Debug)]
 pub struct World<'a> {
     objects: Vec<WorldObject<'a>>,
-    /// The material of faces that have none stands first.
+    /// The distinct materials; that of faces that have none stands first.
     pub materials: Vec<MaterialRecord>,
-    /// The maps of each material that has some.
+    /// The maps of each material.
     textures: Vec<Option<&'a Textures>>,
+    /// The place of each material in the order of first use.
+    slots: Vec<u32>,
     /// Whether no material lets light through.
     pub is_opaque: bool,
-    /// Whether all materials are of models 0 to 2 without halo and maps.
-    pub is_direct: bool,
+    /// Whether a material is of a model beyond 2.
+    pub has_models_beyond_2: bool,
 }
 
 #[derive(Clone, Debug)]
 struct WorldObject<'a> {
     geometry: &'a Geometry,
-    first_material: u32,
+    /// For each slot of the geometry the place in [`World::materials`].
+    materials: Vec<u32>,
     first_part: u32,
     transform: Option<Transform>,
 }
@@ -51,103 +56,156 @@ struct WorldObject<'a> {
 impl<'a> World<'a> {
     /// Takes a frame whose indices are all within what they index.
     pub fn new(frame: &'a Frame) -> Self {
-        let mut objects = Vec::with_capacity(frame.objects.len());
-        let mut materials = vec![MaterialRecord::new(&Material::default())];
-        let mut textures = vec![None];
+        let mut world = Self {
+            objects: Vec::with_capacity(frame.objects.len()),
+            materials: vec![MaterialRecord::new(&Material::default())],
+            textures: vec![None],
+            slots: Vec::new(),
+            is_opaque: true,
+            has_models_beyond_2: false,
+        };
+        let mut places = HashMap::new();
         let mut first_part = 0;
         for Object { geometry, transform } in &frame.objects {
-            let first_material = materials.len() as u32;
-            materials.extend(geometry.materials.iter().map(|m| MaterialRecord::new(m)));
-            let maps = |m: &'a Part<Material>| Some(&m.textures).filter(|t| !t.is_empty());
-            textures.extend(geometry.materials.iter().map(maps));
+            let materials =
+                geometry.materials.iter().map(|m| world.place(m.hash(), m, &mut places)).collect();
             let transform = transform.as_ref().map(Transform::new);
-            objects.push(WorldObject { geometry, first_material, first_part, transform });
+            world.objects.push(WorldObject { geometry, materials, first_part, transform });
             first_part += geometry.meshes.len() as u32;
         }
-        let has_map_d = |t: Option<&Textures>| t.is_some_and(|t| t.map_d.is_some());
-        let is_opaque =
-            materials.iter().all(MaterialRecord::is_opaque) && !textures.iter().copied().any(has_map_d);
-        let is_direct =
-            materials.iter().all(MaterialRecord::is_direct) && textures.iter().all(Option::is_none);
-        Self { objects, materials, textures, is_opaque, is_direct }
+        world.slots = world.order_of_use();
+        world.is_opaque = world.materials.iter().all(MaterialRecord::is_opaque);
+        world.has_models_beyond_2 = world.materials.iter().any(|m| m.illum > 2);
+        world
     }
 
-    /// The surface at a hit of a ray.
+    /// The place of a material, which is added where it is new.
+    fn place(&mut self, name: PartHash, material: &'a Material, places: &mut HashMap<PartHash, u32>) -> u32 {
+        *places.entry(name).or_insert_with(|| {
+            self.materials.push(MaterialRecord::new(material));
+            self.textures.push(Some(&material.textures));
+            self.materials.len() as u32 - 1
+        })
+    }
+
+    /// For each material its place in the order in which triangles use them first.
+    fn order_of_use(&self) -> Vec<u32> {
+        let mut slots = vec![ABSENT; self.materials.len()];
+        let mut used = 0;
+        for object in &self.objects {
+            for &[_, slot] in &object.geometry.material_runs.0 {
+                let place = &mut slots[object.material_in(slot) as usize];
+                if *place == ABSENT {
+                    *place = used;
+                    used += 1;
+                }
+            }
+        }
+        slots
+    }
+
+    /// The place of the material at a hit in [`Self::materials`].
+    pub fn material(&self, hit: &Hit) -> u32 {
+        self.objects[hit.object as usize].material(hit.triangle as usize)
+    }
+
+    /// The place of a hit's material among those that the frame uses, in the order of their first use.
+    pub fn material_slot(&self, hit: &Hit) -> u32 {
+        self.slots[self.material(hit) as usize]
+    }
+
+    /// The maps of a material.
+    pub fn textures(&self, material: u32) -> Option<&'a Textures> {
+        self.textures[material as usize]
+    }
+
+    /// The surface at a hit of a ray; its material is the one given, as the constants have it.
     #[allow(
         clippy::inline_always,
         reason = "built where it is kept, a picture takes a tenth less (benches/shade.rs)"
     )]
     #[inline(always)]
-    pub fn surface(&self, ray: &Ray, hit: &Hit) -> Surface {
+    pub fn surface(&self, ray: &Ray, hit: &Hit, material: u32) -> Surface {
         let object = &self.objects[hit.object as usize];
-        let geometry = object.geometry;
         let triangle = hit.triangle as usize;
-        let corners = geometry.triangles.0[triangle];
-        let [u, v] = hit.barycentric;
-        let weights = [1.0 - u - v, u, v];
-
-        let vertex = |i: u32| geometry.positions.0[i as usize];
-        let (p, magnitude, orientation) = match &object.transform {
-            None => {
-                let p = corners.map(|i| Vec3::from(vertex(i)));
-                (p, magnitude(&p), 1.0)
-            }
-            Some(t) => {
-                let [a, b, c] = corners.map(|i| t.placement.magnitude(vertex(i)));
-                let p = corners.map(|i| t.placement.point(vertex(i)));
-                (p, a.max(b).max(c) + extent(&p), t.orientation)
-            }
-        };
+        let corners = object.geometry.triangles.0[triangle];
+        let weights = weights(hit);
+        let (p, magnitude, orientation) = object.placed(corners);
         let ng = orientation * triangle_normal(p, -ray.direction);
         let is_front = ng.dot(ray.direction) <= 0.0;
         let ng = if is_front { ng } else { -ng };
-        let (material, kd) = self.material(object, triangle, corners, weights);
         Surface {
             position: hit_point(&p, hit.barycentric),
             ng,
             n: shading_normal(object, triangle, weights, ng),
             magnitude,
-            kd,
+            kd: self.diffuse(object, corners, weights, material),
             material,
             is_front,
         }
     }
 
-    /// The maps of a material and where they are looked up at a hit; None where the material has none.
-    pub fn maps(&self, hit: &Hit, material: u32) -> Option<(&'a Textures, Texcoord)> {
-        let textures = self.textures[material as usize]?;
-        let object = &self.objects[hit.object as usize];
-        Some((textures, object.texcoord(hit)))
-    }
-
-    /// The material's place in [`World::materials`] at a hit.
-    pub fn material_of(&self, hit: &Hit) -> u32 {
-        self.objects[hit.object as usize].material(hit.triangle as usize)
-    }
-
-    /// What a material mirrors instead of the scene.
-    pub fn reflection(&self, material: u32) -> Option<&'a Reflection> {
-        self.textures[material as usize]?.refl.as_ref()
-    }
-
-    /// All emitting triangles in order, with their material's emission and their corners in the world.
-    pub fn emitting(&self) -> Vec<(Vec3, [Vec3; 3])> {
-        let mut list = Vec::new();
-        for object in &self.objects {
-            for (i, corners) in object.geometry.triangles.0.iter().enumerate() {
-                let ke = self.materials[object.material(i) as usize].ke;
-                if ke.max_element() > 0.0 {
-                    list.push((ke, object.corners(*corners)));
-                }
-            }
+    /// The material's constants at a hit where they depend on the place or the direction, by maps or a halo; maps
+    /// change the surface's normal and colour, too. `width` is that of the ray's cone there; 0 asks for level 0.
+    pub fn changed(&self, ray: &Ray, hit: &Hit, surface: &mut Surface, width: f32) -> Option<MaterialRecord> {
+        let mut m = self.materials[surface.material as usize];
+        if !m.is(TEXTURED | HALO) {
+            return None;
         }
-        list
+        let footprint = width / surface.ng.dot(ray.direction).abs().max(0.1);
+        if let (true, Some(textures)) = (m.is(TEXTURED), self.textures(surface.material))
+            && let Some(point) = self.map_point(hit, footprint)
+        {
+            m = textured(&m, textures, &point);
+            surface.n = tilted(surface.n, textures, &point);
+            surface.kd = m.kd;
+        }
+        if m.is(HALO) {
+            m = m.with_halo(-surface.n.dot(ray.direction));
+        }
+        Some(m)
     }
 
-    /// The dissolve of the material at a hit.
-    pub fn dissolve(&self, hit: &Hit) -> f32 {
+    /// The dissolve at a hit.
+    pub fn dissolve(&self, ray: &Ray, hit: &Hit, width: f32) -> f32 {
+        let material = self.material(hit);
+        let m = &self.materials[material as usize];
+        if !m.is(TEXTURED | HALO) {
+            return m.d;
+        }
+        let mut surface = self.surface(ray, hit, material);
+        self.changed(ray, hit, &mut surface, width).map_or(m.d, |m| m.d)
+    }
+
+    /// What a shadow ray is let through at a hit.
+    pub fn shadow_factor(&self, ray: &Ray, hit: &Hit) -> Vec3 {
+        let material = self.material(hit);
+        let m = &self.materials[material as usize];
+        if !m.is(TEXTURED_SHADOW | HALO) {
+            return m.shadow_factor();
+        }
+        let unit = Ray { direction: ray.direction.normalize_or_zero(), ..*ray };
+        let mut surface = self.surface(&unit, hit, material);
+        self.changed(&unit, hit, &mut surface, 0.0).as_ref().unwrap_or(m).shadow_factor()
+    }
+
+    /// Texture coordinates at a hit, where the triangle has them.
+    pub fn uv(&self, hit: &Hit) -> Option<[f32; 2]> {
+        self.coordinates(hit).map(|c| mix(c, weights(hit)))
+    }
+
+    fn map_point(&self, hit: &Hit, footprint: f32) -> Option<MapPoint> {
         let object = &self.objects[hit.object as usize];
-        self.materials[object.material(hit.triangle as usize) as usize].d
+        let coordinates = self.coordinates(hit)?;
+        let (p, ..) = object.placed(object.geometry.triangles.0[hit.triangle as usize]);
+        Some(MapPoint::new(p, coordinates, mix(coordinates, weights(hit)), footprint))
+    }
+
+    /// The texture coordinates of a triangle's corners.
+    fn coordinates(&self, hit: &Hit) -> Option<[[f32; 2]; 3]> {
+        let texcoords = self.objects[hit.object as usize].geometry.texcoords.as_ref()?;
+        let corners = texcoords.corners.0[hit.triangle as usize];
+        (!corners.contains(&ABSENT)).then(|| corners.map(|i| texcoords.values.0[i as usize]))
     }
 
     /// The mesh of a hit, counted over all objects, and the triangle's place in it.
@@ -159,15 +217,32 @@ impl<'a> World<'a> {
         [object.first_part + mesh as u32, hit.triangle - meshes[mesh].first_triangle]
     }
 
-    /// The material of a triangle and the diffuse reflectance at a point of it.
-    fn material(
+    /// The triangles of the world that have one of the given materials, in order: a place on them, the material,
+    /// the corners, and their [`Surface::magnitude`].
+    pub fn triangles_of(
         &self,
-        object: &WorldObject,
-        triangle: usize,
-        corners: [u32; 3],
-        weights: [f32; 3],
-    ) -> (u32, Vec3) {
-        let material = object.material(triangle);
+        wanted: impl Fn(u32) -> bool,
+        mut take: impl FnMut(Hit, u32, [Vec3; 3], Vec3),
+    ) {
+        for (place, object) in (0..).zip(&self.objects) {
+            let runs = &object.geometry.material_runs.0;
+            for (i, &[first, slot]) in runs.iter().enumerate() {
+                let material = object.material_in(slot);
+                if !wanted(material) {
+                    continue;
+                }
+                let end = runs.get(i + 1).map_or(object.geometry.triangles.0.len() as u32, |next| next[0]);
+                for triangle in first..end {
+                    let (p, magnitude, _) = object.placed(object.geometry.triangles.0[triangle as usize]);
+                    let at = Hit { distance: 0.0, object: place, triangle, barycentric: [0.0; 2] };
+                    take(at, material, p, magnitude);
+                }
+            }
+        }
+    }
+
+    /// The diffuse reflectance at a point of a triangle: of faces without a material their vertices' colours.
+    fn diffuse(&self, object: &WorldObject, corners: [u32; 3], weights: [f32; 3], material: u32) -> Vec3 {
         let kd = self.materials[material as usize].kd;
         match &object.geometry.colors {
             Some(colors) if material == 0 => {
@@ -175,64 +250,39 @@ impl<'a> World<'a> {
                     let srgb = colors.0[i as usize];
                     if srgb[0].is_nan() { kd } else { srgb.map(linear_from_srgb).into() }
                 };
-                (material, interpolate(corners.map(color), weights))
+                interpolate(corners.map(color), weights)
             }
-            _ => (material, kd),
+            _ => kd,
         }
     }
-}
-
-/// Where maps are looked up at a point of a triangle.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Texcoord {
-    /// (u, v); None where the triangle has no texture coordinates.
-    pub uv: Option<Vec2>,
-    /// Root of the triangle's area in (u, v) over its area in the world: units of u and v for each unit of width.
-    pub uv_per_width: f32,
-    /// Unit direction of growing u in the triangle's plane; 0 where it has none.
-    pub tangent: Vec3,
-    /// Unit direction of growing v in the triangle's plane; 0 where it has none.
-    pub bitangent: Vec3,
 }
 
 impl WorldObject<'_> {
-    fn corners(&self, corners: [u32; 3]) -> [Vec3; 3] {
-        corners.map(|i| {
-            let p = self.geometry.positions.0[i as usize];
-            self.transform.as_ref().map_or_else(|| p.into(), |t| t.placement.point(p))
-        })
-    }
-
-    fn texcoord(&self, hit: &Hit) -> Texcoord {
-        let none = Texcoord { uv: None, uv_per_width: 0.0, tangent: Vec3::ZERO, bitangent: Vec3::ZERO };
-        let Some(texcoords) = &self.geometry.texcoords else { return none };
-        let corners = texcoords.corners.0[hit.triangle as usize];
-        if corners.contains(&ABSENT) {
-            return none;
-        }
-        let t = corners.map(|i| Vec2::from(texcoords.values.0[i as usize]));
-        let p = self.corners(self.geometry.triangles.0[hit.triangle as usize]);
-        let [u, v] = hit.barycentric;
-        let (e1, e2) = (p[1] - p[0], p[2] - p[0]);
-        let (d1, d2) = (t[1] - t[0], t[2] - t[0]);
-        let uv_area = d1.perp_dot(d2);
-        // position as a function of (u, v): its derivatives, but for the factor 1 / uv_area
-        let side = uv_area.signum();
-        Texcoord {
-            uv: Some(t[0] * (1.0 - u - v) + t[1] * u + t[2] * v),
-            uv_per_width: (uv_area.abs() / e1.cross(e2).length().max(f32::MIN_POSITIVE)).sqrt(),
-            tangent: ((e1 * d2.y - e2 * d1.y) * side).normalize_or_zero(),
-            bitangent: ((e2 * d1.x - e1 * d2.x) * side).normalize_or_zero(),
-        }
-    }
-
     /// The place of a triangle's material in [`World::materials`].
     fn material(&self, triangle: usize) -> u32 {
         let runs = &self.geometry.material_runs.0;
         let after = runs.partition_point(|&[first, _]| first as usize <= triangle);
-        match after.checked_sub(1).map(|run| runs[run][1]) {
-            None | Some(ABSENT) => 0,
-            Some(slot) => self.first_material + slot,
+        after.checked_sub(1).map_or(0, |run| self.material_in(runs[run][1]))
+    }
+
+    fn material_in(&self, slot: u32) -> u32 {
+        if slot == ABSENT { 0 } else { self.materials[slot as usize] }
+    }
+
+    /// Corners in the world, how large the numbers are that they come from, and −1 where the object is mirrored.
+    #[inline]
+    fn placed(&self, corners: [u32; 3]) -> ([Vec3; 3], Vec3, f32) {
+        let vertex = |i: u32| self.geometry.positions.0[i as usize];
+        match &self.transform {
+            None => {
+                let p = corners.map(|i| Vec3::from(vertex(i)));
+                (p, magnitude(&p), 1.0)
+            }
+            Some(t) => {
+                let [a, b, c] = corners.map(|i| t.placement.magnitude(vertex(i)));
+                let p = corners.map(|i| t.placement.point(vertex(i)));
+                (p, a.max(b).max(c) + extent(&p), t.orientation)
+            }
         }
     }
 }
@@ -262,8 +312,20 @@ impl Transform {
     }
 }
 
+/// The weights of a triangle's corners at a hit.
+fn weights(hit: &Hit) -> [f32; 3] {
+    let [u, v] = hit.barycentric;
+    [1.0 - u - v, u, v]
+}
+
 fn interpolate(at_corners: [Vec3; 3], weights: [f32; 3]) -> Vec3 {
     at_corners[0] * weights[0] + at_corners[1] * weights[1] + at_corners[2] * weights[2]
+}
+
+fn mix(at_corners: [[f32; 2]; 3], weights: [f32; 3]) -> [f32; 2] {
+    [0, 1].map(|k| {
+        at_corners[0][k] * weights[0] + at_corners[1][k] * weights[1] + at_corners[2][k] * weights[2]
+    })
 }
 
 /// The unit normal of a triangle, counter-clockwise; `otherwise` where f32 knows none.
@@ -283,9 +345,4 @@ fn shading_normal(object: &WorldObject, triangle: usize, weights: [f32; 3], ng: 
     let n = interpolate(corners.map(|i| normals.values.0[i as usize].into()), weights);
     let n = object.transform.as_ref().map_or(n, |t| t.cofactors * n).normalize_or(ng);
     if n.dot(ng) < 0.0 { -n } else { n }
-}
-
-/// IEC 61966-2-1.
-fn linear_from_srgb(x: f32) -> f32 {
-    if x <= 0.04045 { x / 12.92 } else { powf((x + 0.055) / 1.055, 2.4) }
 }

@@ -1,6 +1,6 @@
 //! Vectors (glam's), boxes, and the float steps that the canonical hit is made of.
 
-pub use glam::{Affine3A, DAffine3, DMat3, DVec3, Mat3, Vec2, Vec3};
+pub use glam::{Affine3A, DAffine3, DMat3, DVec3, Mat3, Vec2, Vec3, Vec4};
 
 /// An axis-aligned box in f64, empty until something is added.
 #[derive(Clone, Copy, Debug, PartialEq)]

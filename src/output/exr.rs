@@ -41,6 +41,14 @@ fn aov_channels(film: &Film) -> Vec<Channel> {
             channels.push(AnyChannel::new(name, FlatSamples::U32(id.iter().map(|id| id[i]).collect())));
         }
     }
+    let material = aovs.material.iter();
+    channels.extend(material.map(|m| AnyChannel::new("material.slot", FlatSamples::U32(m.clone()))));
+    if let Some(uv) = &aovs.uv {
+        for (i, name) in ["uv.U", "uv.V"].into_iter().enumerate() {
+            channels.push(plane(name, uv.iter().map(|uv| uv[i]).collect()));
+        }
+    }
+    channels.extend(aovs.coverage.iter().map(|coverage| plane("coverage.A", coverage.clone())));
     channels
 }
 

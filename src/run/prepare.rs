@@ -6,7 +6,7 @@ use super::source::Sources;
 use crate::format;
 use crate::job::{Background, Job, LightChoice, Picture, Sequence, auto};
 use crate::math::Bounds;
-use crate::scene::{self, Camera, Light, Map, Object, Part, Shot, Texture};
+use crate::scene::{self, Camera, Light, Object, Part, Shot, Texture};
 use crate::warning::Warnings;
 use rayon::prelude::*;
 use std::collections::HashMap;
@@ -16,7 +16,7 @@ use std::sync::Arc;
 /// What was found out of each sequence, by its place in the job.
 pub(super) struct Prepared {
     sequences: Vec<Found>,
-    /// The background pictures, each read once.
+    /// Background pictures, or why there is none.
     backgrounds: HashMap<PathBuf, Result<Part<Texture>, String>>,
     pub(super) sources: Sources,
     pub(super) warnings: Warnings,
@@ -32,18 +32,10 @@ struct Found {
 pub(super) fn prepare(job: &Job, options: &RunOptions) -> Prepared {
     let mut prepared = Prepared {
         sequences: job.sequences.iter().map(|_| Found::default()).collect(),
-        backgrounds: HashMap::new(),
+        backgrounds: backgrounds(job),
         sources: Sources::default(),
         warnings: job.warnings.clone(),
     };
-    for picture in &job.pictures {
-        if let Background::File(path) = &picture.settings.background
-            && !prepared.backgrounds.contains_key(path)
-        {
-            let read = format::load_picture(path).map_err(|e| e.to_string());
-            prepared.backgrounds.insert(path.clone(), read);
-        }
-    }
     for (i, sequence) in job.sequences.iter().enumerate() {
         let pictures = || job.pictures.iter().filter(|p| p.sequence == i);
         let auto_light = pictures().any(|p| p.settings.lights == LightChoice::Auto);
@@ -73,11 +65,11 @@ impl Prepared {
         };
         let background = match &picture.settings.background {
             Background::Color(color) => scene::Background::Color(*color),
-            Background::File(path) => match self.backgrounds.get(path) {
-                Some(Ok(texture)) => scene::Background::Picture(Map::plain(texture.clone())),
-                Some(Err(error)) => return Err(error.clone()),
-                None => return Err(format!("{}: was not read", path.display())),
-            },
+            Background::File(path) => {
+                let read =
+                    self.backgrounds.get(path).ok_or_else(|| format!("{}: was not read", path.display()))?;
+                scene::Background::Picture(read.clone()?)
+            }
         };
         Ok(picture.settings.shot(self.camera(picture), lights, background))
     }
@@ -89,6 +81,18 @@ impl Prepared {
             .camera_at(picture.frame)
             .unwrap_or_else(|| auto::camera(&bounds(), &picture.settings))
     }
+}
+
+/// The background pictures of a job, each read once.
+fn backgrounds(job: &Job) -> HashMap<PathBuf, Result<Part<Texture>, String>> {
+    let mut read = HashMap::new();
+    for picture in &job.pictures {
+        if let Background::File(path) = &picture.settings.background {
+            let load = || format::load_picture(path).map_err(|e| format!("{e}; the frame is not rendered"));
+            read.entry(path.clone()).or_insert_with(load);
+        }
+    }
+    read
 }
 
 /// The box of a sequence's layers over the frames that are looked at; files are scanned on all cores. What cannot be

@@ -207,7 +207,7 @@ pub fn read_frame(
     load_frame(job, picture, sources, lenient, false, warnings).map(|l| l.frame)
 }
 
-/// Names what of the materials is not rendered as it says, and frames that nothing can be seen of.
+/// Names frames that nothing can be seen of.
 fn warn_of_materials(path: &Path, loaded: &Loaded, warnings: &mut Warnings) {
     let g = &loaded.geometry;
     let has_faces = !g.triangles.0.is_empty();

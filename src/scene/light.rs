@@ -53,9 +53,9 @@ pub enum Light {
         /// How it weakens.
         falloff: Falloff,
     },
-    /// Every triangle with Ke > 0.
+    /// Every triangle of the frame with Ke.
     Area {
-        /// Points of them that are tried at every shading point, 1 or more.
+        /// Points that each shading point looks at, 1 or more.
         samples: u32,
     },
 }

@@ -19,11 +19,6 @@ pub struct Textures {
 }
 
 impl Textures {
-    /// Whether there is no map at all.
-    pub fn is_empty(&self) -> bool {
-        self.refl.is_none() && self.maps().iter().all(Option::is_none)
-    }
-
     /// All maps in a fixed order, without those of `refl`.
     pub fn maps(&self) -> [Option<&Map>; 8] {
         [

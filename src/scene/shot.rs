@@ -2,8 +2,8 @@
 
 use super::camera::Camera;
 use super::light::Light;
-use super::part::PartHasher;
-use super::texture::Map;
+use super::part::{Part, PartHasher};
+use super::texture::Texture;
 use crate::math::Vec3;
 
 /// The pixel filter, sampled, not splatted.
@@ -32,11 +32,26 @@ pub enum Aov {
     Albedo,
     /// `id.part` and `id.triangle`.
     Id,
+    /// The material, by its place among the frame's distinct ones in the order of their first use.
+    Material,
+    /// Texture coordinates.
+    Uv,
+    /// What is not background, mean over the samples.
+    Coverage,
 }
 
 impl Aov {
     /// All of them, in the order in which they are written.
-    pub const ALL: [Self; 5] = [Self::Depth, Self::Normal, Self::Position, Self::Albedo, Self::Id];
+    pub const ALL: [Self; 8] = [
+        Self::Depth,
+        Self::Normal,
+        Self::Position,
+        Self::Albedo,
+        Self::Id,
+        Self::Material,
+        Self::Uv,
+        Self::Coverage,
+    ];
 
     /// The word on the command line and in the job file.
     pub fn word(self) -> &'static str {
@@ -46,6 +61,9 @@ impl Aov {
             Self::Position => "position",
             Self::Albedo => "albedo",
             Self::Id => "id",
+            Self::Material => "material",
+            Self::Uv => "uv",
+            Self::Coverage => "coverage",
         }
     }
 }
@@ -76,8 +94,23 @@ impl AovSet {
 pub enum Background {
     /// A colour, linear RGB.
     Color(Vec3),
-    /// A picture around the scene, by latitude and longitude.
-    Picture(Map),
+    /// A latitude-longitude picture: −z in its middle, +x to the right of it, +y at the top.
+    Picture(Part<Texture>),
+}
+
+impl Background {
+    fn hash_into(&self, h: &mut PartHasher) {
+        match self {
+            Self::Color(color) => {
+                h.u64(0);
+                h.slice(&[*color]);
+            }
+            Self::Picture(texture) => {
+                h.u64(1);
+                h.part(texture.hash());
+            }
+        }
+    }
 }
 
 /// Everything but the geometry that bears on the film of one frame.
@@ -118,10 +151,7 @@ impl Shot {
             l.hash_into(h);
         }
         h.slice(&[self.ambient]);
-        match &self.background {
-            Background::Color(color) => h.slice(&[*color]),
-            Background::Picture(map) => map.hash_into(h),
-        }
+        self.background.hash_into(h);
         h.slice(&self.size);
         h.slice(&[self.samples, self.filter as u32, self.depth, self.seed]);
         h.f32(self.prune);

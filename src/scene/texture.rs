@@ -101,19 +101,6 @@ pub struct Map {
 }
 
 impl Map {
-    /// A texture without options.
-    pub fn plain(texture: Part<Texture>) -> Self {
-        Self {
-            texture,
-            scale: [1.0; 2],
-            offset: [0.0; 2],
-            clamp: false,
-            base_gain: [0.0, 1.0],
-            bump_multiplier: 1.0,
-            channel: None,
-        }
-    }
-
     /// Adds it to a hash.
     pub fn hash_into(&self, h: &mut PartHasher) {
         h.part(self.texture.hash());
