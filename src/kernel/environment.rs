@@ -2,20 +2,23 @@
 
 use super::texture::{map_at, map_clamped_at, trilinear};
 use crate::math::Vec3;
-use crate::scene::{Background, Reflection};
+use crate::scene::{Background, Reflection, Texture};
 use std::f32::consts::{FRAC_1_PI, PI};
 
 /// What is seen of the background in a direction.
+#[inline]
 pub fn background(background: &Background, direction: Vec3) -> Vec3 {
     match background {
         Background::Color(color) => *color,
-        // around, the picture goes on at its other edge; beyond its upper and lower edge it must not
-        Background::Picture(texture) => {
-            let [u, v] = latitude_longitude(direction);
-            let half_texel = 0.5 / texture.size[1] as f32;
-            trilinear(texture, [u, v.clamp(half_texel, 1.0 - half_texel)], 0.0, false).truncate()
-        }
+        Background::Picture(texture) => picture(texture, direction),
     }
+}
+
+/// A latitude-longitude picture. Around, it goes on at its other edge; beyond its upper and lower edge it must not.
+fn picture(texture: &Texture, direction: Vec3) -> Vec3 {
+    let [u, v] = latitude_longitude(direction);
+    let half_texel = 0.5 / texture.size[1] as f32;
+    trilinear(texture, [u, v.clamp(half_texel, 1.0 - half_texel)], 0.0, false).truncate()
 }
 
 /// What is seen of a `refl` map in a direction.

@@ -87,6 +87,7 @@ pub struct PixelSum {
 
 impl PixelSum {
     /// A path leaves the scene. With alpha the background adds no colour to camera rays.
+    #[inline]
     pub fn escape(&mut self, shot: &Shot, path: &Path, ray: &Ray) {
         if path.is_camera {
             self.through += path.weight.element_sum() / 3.0;

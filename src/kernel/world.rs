@@ -270,7 +270,8 @@ impl WorldObject<'_> {
     }
 
     /// Corners in the world, how large the numbers are that they come from, and −1 where the object is mirrored.
-    #[inline]
+    #[allow(clippy::inline_always, reason = "as `World::surface`, which is most of what needs it")]
+    #[inline(always)]
     fn placed(&self, corners: [u32; 3]) -> ([Vec3; 3], Vec3, f32) {
         let vertex = |i: u32| self.geometry.positions.0[i as usize];
         match &self.transform {
