@@ -2,6 +2,7 @@
 
 use super::mtl::{Given, MapSlot, MapStatement, Side};
 use super::texture::TextureUse;
+use crate::math::linear_from_srgb;
 use crate::scene::{Map, Material, Part, Reflection, Texture, Textures};
 use std::path::PathBuf;
 
@@ -61,7 +62,7 @@ pub(super) fn material(
 /// What the statements say, and the defaults for what they do not: 1 for what has a map.
 fn filled_in(given: &Given, textures: Textures, srgb: bool) -> Material {
     let color = |color: Option<[f32; 3]>, map: &Option<Map>, absent: f32| {
-        let given = color.map(|c| if srgb { c.map(linear_from_srgb) } else { c });
+        let given = color.map(|c| if srgb { c.map(linear) } else { c });
         given.unwrap_or([if map.is_some() { 1.0 } else { absent }; 3])
     };
     let ks = color(given.ks, &textures.map_ks, 0.0);
@@ -123,15 +124,9 @@ fn textures(maps: Vec<FoundMap>) -> Textures {
     textures
 }
 
-/// IEC 61966-2-1. What is above 1 has no place on the curve and stays.
-fn linear_from_srgb(x: f32) -> f32 {
-    if x <= 0.04045 {
-        x / 12.92
-    } else if x < 1.0 {
-        ((x + 0.055) / 1.055).powf(2.4)
-    } else {
-        x
-    }
+/// What is above 1 has no place on the curve and stays.
+fn linear(x: f32) -> f32 {
+    if x < 1.0 { linear_from_srgb(f64::from(x)) as f32 } else { x }
 }
 
 #[cfg(test)]

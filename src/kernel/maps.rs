@@ -1,7 +1,8 @@
 //! What the maps of a material make of its constants and of the normal at a point.
 
 use super::material::MaterialRecord;
-use super::texture::{bilinear, map_at, map_coordinates};
+use super::power::log2;
+use super::texture::{Axis, Level, map_at, map_coordinates};
 use crate::math::{Vec2, Vec3, Vec4};
 use crate::scene::{Channel, Map, Textures};
 
@@ -32,12 +33,12 @@ impl MapPoint {
         Self { uv, scale, width, tangents }
     }
 
-    /// log2 of the footprint in texels of level 0.
+    /// log2 of the footprint in texels of level 0, at least 0.
     fn level(&self, map: &Map) -> f32 {
         let [w, h] = map.texture.size.map(|s| s as f32);
-        let texels = self.scale * (map.scale[0] * map.scale[1]).abs().sqrt() * (w * h).sqrt();
-        let level = libm::log2f(self.width * texels);
-        if level.is_nan() { 0.0 } else { level }
+        let texels = self.width * self.scale * (w * h * (map.scale[0] * map.scale[1]).abs()).sqrt();
+        // also where it is not a number
+        if texels > 1.0 { log2(f64::from(texels)) as f32 } else { 0.0 }
     }
 }
 
@@ -49,9 +50,12 @@ pub fn textured(m: &MaterialRecord, textures: &Textures, point: &MapPoint) -> Ma
         map.as_ref().map_or(1.0, |map| channel(at(map), map.channel.unwrap_or(otherwise(map))))
     };
     let alpha = |map: &Map| if map.texture.alpha_varies { Channel::Alpha } else { Channel::Luminance };
+    let kd = color(&textures.map_kd);
+    // usually the same map
+    let ka = if textures.map_ka == textures.map_kd { kd } else { color(&textures.map_ka) };
     MaterialRecord {
-        ka: m.ka * color(&textures.map_ka),
-        kd: m.kd * color(&textures.map_kd),
+        ka: m.ka * ka,
+        kd: m.kd * kd,
         ks: m.ks * color(&textures.map_ks),
         ke: m.ke * color(&textures.map_ke),
         ns: (m.ns * number(&textures.map_ns, |_| Channel::Luminance)).clamp(0.0, f32::MAX),
@@ -92,22 +96,17 @@ fn axes(n: Vec3, map: &Map, point: &MapPoint) -> [Vec3; 2] {
 /// Half the differences of the heights a texel to both sides, along u and v, of the level that is next.
 fn slopes(map: &Map, point: &MapPoint) -> [f32; 2] {
     let texture = &map.texture;
-    let level = point.level(map).round().clamp(0.0, (texture.levels() - 1) as f32) as u32;
-    let size = texture.level_size(level);
-    let uv = map_coordinates(map, point.uv);
-    let height = |uv| {
+    let nearest = ((point.level(map) + 0.5) as u32).min(texture.levels() - 1);
+    let level = Level::new(texture, nearest, map.clamp);
+    let [column, row] = level.axes(map_coordinates(map, point.uv));
+    let height = |column: Axis, row: Axis| {
         let [base, gain] = map.base_gain;
-        let texel = bilinear(texture, uv, level, map.clamp) * gain + base;
-        channel(texel, map.channel.unwrap_or(Channel::Luminance))
+        channel(level.mix(column, row) * gain + base, map.channel.unwrap_or(Channel::Luminance))
     };
-    [0, 1].map(|k| {
-        let beside = |side: f32| {
-            let mut uv = uv;
-            uv[k] += side / size[k] as f32;
-            height(uv)
-        };
-        (beside(1.0) - beside(-1.0)) / 2.0
-    })
+    let along_u = height(column.moved(1), row) - height(column.moved(-1), row);
+    // rows run down
+    let along_v = height(column, row.moved(-1)) - height(column, row.moved(1));
+    [along_u / 2.0, along_v / 2.0]
 }
 
 fn channel(texel: Vec4, channel: Channel) -> f32 {
@@ -141,7 +140,7 @@ mod tests {
         // -s 2 2: twice as many
         let scaled = Map { scale: [2.0, -2.0], ..m.clone() };
         assert!((point([0.0; 2], 0.5).level(&scaled) - 3.0).abs() < 1e-5);
-        assert_eq!(point([0.0; 2], 0.0).level(&m), f32::NEG_INFINITY);
+        assert_eq!(point([0.0; 2], 0.0).level(&m), 0.0);
         let flat = MapPoint::new([Vec3::ZERO; 3], [[0.0; 2]; 3], [0.0; 2], 1.0);
         assert_eq!(flat.level(&m), 0.0);
     }

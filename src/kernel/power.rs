@@ -27,7 +27,7 @@ pub fn powf(x: f32, y: f32) -> f32 {
 }
 
 /// log2 of a positive normal float, by x = 2^e·m and the series of artanh((m − 1)/(m + 1)).
-fn log2(x: f64) -> f64 {
+pub fn log2(x: f64) -> f64 {
     let e = x.to_bits().wrapping_sub(SQRT_HALF_BITS) as i64 >> 52;
     let m = f64::from_bits(x.to_bits().wrapping_sub((e as u64) << 52));
     let s = (m - 1.0) / (m + 1.0);

@@ -1,27 +1,23 @@
-//! Texels: decoding, bilinear within a level, linear between levels.
+//! Texels: bilinear within a level, linear between levels.
 
 use super::power::powf;
-use crate::math::Vec4;
+use crate::math::{LINEAR_FROM_SRGB8, Vec4};
 use crate::scene::{Map, TexelSpace, Texels, Texture};
-use std::sync::LazyLock;
 
 /// A texture at (u, v), v running up, at a level of any value; repeated or clamped. RGBA, linear.
-pub fn trilinear(texture: &Texture, [u, v]: [f32; 2], level: f32, clamp: bool) -> Vec4 {
+pub fn trilinear(texture: &Texture, uv: [f32; 2], level: f32, clamp: bool) -> Vec4 {
     let level = level.clamp(0.0, (texture.levels() - 1) as f32);
-    let lower = level.floor();
-    let at = |level: f32| bilinear(texture, [u, v], level as u32, clamp);
-    let share = level - lower;
-    if share == 0.0 { at(lower) } else { at(lower) * (1.0 - share) + at(lower + 1.0) * share }
+    let lower = level as u32;
+    let share = level - lower as f32;
+    let at = |level: u32| bilinear(texture, uv, level, clamp);
+    if share == 0.0 { at(lower) } else { at(lower) * (1.0 - share) + at(lower + 1) * share }
 }
 
 /// A texture at (u, v) within a level: texels lie at the middle of their squares.
 pub fn bilinear(texture: &Texture, uv: [f32; 2], level: u32, clamp: bool) -> Vec4 {
-    let size = texture.level_size(level);
-    let first = first_texel(texture, level);
-    let [column, row] = [axis(uv[0], size[0], clamp), axis(1.0 - uv[1], size[1], clamp)];
-    let at = |x: u32, y: u32| texel(texture, first + y as usize * size[0] as usize + x as usize);
-    let along = |y: u32| at(column.low, y) * (1.0 - column.share) + at(column.high, y) * column.share;
-    along(row.low) * (1.0 - row.share) + along(row.high) * row.share
+    let level = Level::new(texture, level, clamp);
+    let [column, row] = level.axes(uv);
+    level.mix(column, row)
 }
 
 /// A map at texture coordinates: its scale and offset before, its base and gain after.
@@ -41,49 +37,112 @@ pub fn map_coordinates(map: &Map, uv: [f32; 2]) -> [f32; 2] {
     [0, 1].map(|k| uv[k] * map.scale[k] + map.offset[k])
 }
 
-/// Two texels beside each other, and how much the second counts for.
-struct Axis {
-    low: u32,
-    high: u32,
+/// One level of a texture.
+pub struct Level<'a> {
+    texture: &'a Texture,
+    size: [u32; 2],
+    /// The place of its first texel.
+    first: usize,
+    clamp: bool,
+}
+
+/// Two texels beside each other: the place of the first, which may lie outside, and how much the second counts for.
+#[derive(Clone, Copy, Debug)]
+pub struct Axis {
+    low: i32,
     share: f32,
 }
 
-fn axis(u: f32, size: u32, clamp: bool) -> Axis {
-    let u = if clamp { u.clamp(0.0, 1.0) } else { u - u.floor() };
-    let x = u * size as f32 - 0.5;
-    let floor = x.floor();
-    // what is not a number becomes 0
-    let (low, share) = (floor as i64, if floor.is_finite() { x - floor } else { 0.0 });
-    let last = i64::from(size) - 1;
-    let place = |i: i64| if clamp { i.clamp(0, last) } else { i.rem_euclid(last + 1) } as u32;
-    Axis { low: place(low), high: place(low + 1), share }
-}
-
-/// The place of a level's first texel.
-fn first_texel(texture: &Texture, level: u32) -> usize {
-    (0..level).map(|l| texture.level_size(l).map(|s| s as usize)).map(|[w, h]| w * h).sum()
-}
-
-/// A texel, linear; black beyond the last.
-fn texel(texture: &Texture, place: usize) -> Vec4 {
-    match &texture.texels {
-        Texels::F32(texels) => texels.get(place).map_or(Vec4::ZERO, |&t| t.into()),
-        Texels::U8(texels) => {
-            let Some(&[r, g, b, a]) = texels.get(place) else { return Vec4::ZERO };
-            let of = |x: u8| match texture.space {
-                TexelSpace::Srgb => LINEAR_FROM_SRGB[usize::from(x)],
-                TexelSpace::Linear => f32::from(x) / 255.0,
-            };
-            Vec4::new(of(r), of(g), of(b), f32::from(a) / 255.0)
-        }
+impl Axis {
+    /// The same, whole texels further.
+    pub fn moved(self, by: i32) -> Self {
+        Self { low: self.low + by, ..self }
     }
 }
 
-/// IEC 61966-2-1 of the 256 shares.
-static LINEAR_FROM_SRGB: LazyLock<[f32; 256]> =
-    LazyLock::new(|| std::array::from_fn(|i| linear_from_srgb(i as f32 / 255.0)));
+impl<'a> Level<'a> {
+    /// A level that the texture has.
+    pub fn new(texture: &'a Texture, level: u32, clamp: bool) -> Self {
+        let texels = |level| texture.level_size(level).map(|s| s as usize).iter().product::<usize>();
+        Self { texture, size: texture.level_size(level), first: (0..level).map(texels).sum(), clamp }
+    }
 
-/// IEC 61966-2-1.
+    /// Where (u, v) lies along columns and rows; v runs up, rows run down.
+    pub fn axes(&self, [u, v]: [f32; 2]) -> [Axis; 2] {
+        [self.axis(u, self.size[0]), self.axis(1.0 - v, self.size[1])]
+    }
+
+    fn axis(&self, u: f32, size: u32) -> Axis {
+        let u = if self.clamp { unit(u) } else { fraction(u) };
+        // half a texel before the middle of the first one, so that the cast rounds down
+        let x = u * size as f32 + 0.5;
+        let up = x as i32;
+        Axis { low: up - 1, share: x - up as f32 }
+    }
+
+    /// Between the four texels of a column and a row.
+    pub fn mix(&self, column: Axis, row: Axis) -> Vec4 {
+        let [width, height] = self.size;
+        let [x0, x1] = [column.low, column.low + 1].map(|x| self.place(x, width));
+        let [y0, y1] = [row.low, row.low + 1].map(|y| self.first + self.place(y, height) * width as usize);
+        let places = [y0 + x0, y0 + x1, y1 + x0, y1 + x1];
+        let along = |a: Vec4, b: Vec4, share: f32| a * (1.0 - share) + b * share;
+        let mixed =
+            |[a, b, c, d]: [Vec4; 4]| along(along(a, b, column.share), along(c, d, column.share), row.share);
+        match &self.texture.texels {
+            Texels::F32(texels) => mixed(places.map(|i| texels.get(i).map_or(Vec4::ZERO, |&t| t.into()))),
+            Texels::U8(texels) => {
+                let codes = places.map(|i| texels.get(i).copied().unwrap_or_default());
+                match self.texture.space {
+                    TexelSpace::Linear => mixed(codes.map(|code| Vec4::from(code.map(f32::from)))) / 255.0,
+                    TexelSpace::Srgb => {
+                        let table = &*LINEAR_FROM_SRGB8;
+                        mixed(codes.map(|[r, g, b, a]| {
+                            let [r, g, b] = [r, g, b].map(|c| table[usize::from(c)]);
+                            Vec4::new(r, g, b, f32::from(a) / 255.0)
+                        }))
+                    }
+                }
+            }
+        }
+    }
+
+    /// A place that may lie a few texels outside, within a side.
+    fn place(&self, mut i: i32, size: u32) -> usize {
+        let size = size as i32;
+        if self.clamp {
+            return i.clamp(0, size - 1) as usize;
+        }
+        while i < 0 {
+            i += size;
+        }
+        while i >= size {
+            i -= size;
+        }
+        i as usize
+    }
+}
+
+/// Brought into [0, 1]; 0 for what is not a number.
+#[expect(
+    clippy::manual_clamp,
+    reason = "`clamp` keeps what is not a number, `max` returns its other operand"
+)]
+fn unit(u: f32) -> f32 {
+    u.max(0.0).min(1.0)
+}
+
+/// What is above the next lower integer; 0 where a float has no fraction or is not a number.
+fn fraction(u: f32) -> f32 {
+    if u.abs() < 8_388_608.0 {
+        let fraction = u - u as i32 as f32;
+        if fraction < 0.0 { fraction + 1.0 } else { fraction }
+    } else {
+        0.0
+    }
+}
+
+/// The inverse of the sRGB curve, of colours of vertices.
 pub fn linear_from_srgb(x: f32) -> f32 {
     if x <= 0.04045 { x / 12.92 } else { powf((x + 0.055) / 1.055, 2.4) }
 }

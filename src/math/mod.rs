@@ -1,6 +1,9 @@
 //! Vectors (glam's), boxes, and the float steps that the canonical hit is made of.
 
+mod srgb;
+
 pub use glam::{Affine3A, DAffine3, DMat3, DVec3, Mat3, Vec2, Vec3, Vec4};
+pub use srgb::{LINEAR_FROM_SRGB8, linear_from_srgb, srgb_from_linear};
 
 /// An axis-aligned box in f64, empty until something is added.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -5,21 +5,14 @@
 //! cannot be seen, and often is black, must not darken the rims of leaves. Where nothing can be seen, the plain mean
 //! stands.
 
+use crate::math::{LINEAR_FROM_SRGB8, linear_from_srgb};
 use crate::scene::TexelSpace;
 use rayon::prelude::*;
 use std::sync::LazyLock;
 
-/// Linear light of each sRGB byte (IEC 61966-2-1).
-static LINEAR: LazyLock<[f32; 256]> =
-    LazyLock::new(|| std::array::from_fn(|byte| linear_from_srgb(byte as f64 / 255.0) as f32));
-
 /// The linear light from which on a byte is the next one: halfway between two on the curve.
 static BORDERS: LazyLock<[f32; 255]> =
     LazyLock::new(|| std::array::from_fn(|byte| linear_from_srgb((byte as f64 + 0.5) / 255.0) as f32));
-
-fn linear_from_srgb(x: f64) -> f64 {
-    if x <= 0.04045 { x / 12.92 } else { ((x + 0.055) / 1.055).powf(2.4) }
-}
 
 /// Shares of 65535 as floats, alpha too; colours through the sRGB curve.
 pub(super) fn floats(texel: [u16; 4], is_color: bool) -> [f32; 4] {
@@ -37,7 +30,7 @@ pub(super) fn levels_u8(
 ) -> Vec<[u8; 4]> {
     let to_float = |[r, g, b, a]: [u8; 4]| {
         let linear = |x: u8| match space {
-            TexelSpace::Srgb => LINEAR[usize::from(x)],
+            TexelSpace::Srgb => LINEAR_FROM_SRGB8[usize::from(x)],
             TexelSpace::Linear => f32::from(x) / 255.0,
         };
         [linear(r), linear(g), linear(b), f32::from(a) / 255.0]
