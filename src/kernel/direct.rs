@@ -7,7 +7,7 @@ use super::scene::Scene;
 use super::shade::{Reflected, faces, reflect, unshadowed};
 use super::world::{Surface, World};
 use super::{RayCounts, SURFACES_MAX};
-use crate::accel::{Aggregate, HitOrder, Ray, offset_origin};
+use crate::accel::{Aggregate, Hit, Ray, offset_origin};
 use crate::math::Vec3;
 use std::borrow::Borrow;
 
@@ -75,6 +75,8 @@ pub struct ShadowRays {
     rays: Vec<Ray>,
     ends: Vec<f32>,
     occluded: Vec<bool>,
+    /// The first hit of each ray, where it may be of something transparent.
+    hits: Vec<Option<Hit>>,
     /// For each ray its surface, by place, and what arrives there.
     lit: Vec<(u32, Incident)>,
 }
@@ -154,6 +156,9 @@ impl ShadowRays {
         if world.is_opaque {
             self.occluded.resize(self.rays.len(), false);
             aggregate.occluded_batch(&self.rays, &self.ends, &mut self.occluded);
+        } else {
+            self.hits.resize(self.rays.len(), None);
+            aggregate.closest_batch(&self.rays, &mut self.hits);
         }
         for (ray, &(place, incident)) in self.lit.iter().enumerate() {
             let s = &mut shadings[place as usize];
@@ -165,7 +170,8 @@ impl ShadowRays {
                 }
                 continue;
             }
-            let visibility = transmittance(*aggregate, world, &self.rays[ray], self.ends[ray]);
+            let visibility =
+                transmittance(*aggregate, world, &self.rays[ray], self.ends[ray], self.hits[ray]);
             if visibility != Vec3::ZERO {
                 let reflected = reflect(&s.surface, constants.of(s), s.view, &incident);
                 s.sum.diffuse += reflected.diffuse * visibility;
@@ -177,17 +183,23 @@ impl ShadowRays {
 
 /// The share of light that comes along a shadow ray through surfaces that are not opaque: the product of what they let
 /// through, in order; 0 after [`SURFACES_MAX`].
-fn transmittance<A: Aggregate>(aggregate: &A, world: &World, ray: &Ray, end: f32) -> Vec3 {
+fn transmittance<A: Aggregate>(
+    aggregate: &A,
+    world: &World,
+    ray: &Ray,
+    end: f32,
+    first: Option<Hit>,
+) -> Vec3 {
     let mut share = Vec3::ONE;
-    let mut after: Option<HitOrder> = None;
+    let mut next = first;
     for _ in 0..SURFACES_MAX {
-        match aggregate.closest(ray, after) {
+        match next {
             Some(hit) if hit.distance < end => {
                 share *= world.shadow_factor(ray, &hit);
                 if share == Vec3::ZERO {
                     return share;
                 }
-                after = Some(aggregate.order(&hit));
+                next = aggregate.closest(ray, Some(aggregate.order(&hit)));
             }
             _ => return share,
         }
