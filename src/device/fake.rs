@@ -72,7 +72,7 @@ pub fn color_of(frame: &Frame, shot: &Shot) -> [f32; 3] {
     if frame.triangles() == 0 {
         return match shot.background {
             Background::Color(color) => color.into(),
-            Background::Picture(_) => [0.5; 3],
+            Background::Picture { .. } => [0.5; 3],
         };
     }
     let bits = frame.hash().0;

@@ -10,7 +10,10 @@ use std::f32::consts::{FRAC_1_PI, PI};
 pub fn background(background: &Background, direction: Vec3) -> Vec3 {
     match background {
         Background::Color(color) => *color,
-        Background::Picture(texture) => picture(texture, direction),
+        Background::Picture { texture, is_z_up: false } => picture(texture, direction),
+        Background::Picture { texture, is_z_up: true } => {
+            picture(texture, Vec3::new(direction.x, direction.z, -direction.y))
+        }
     }
 }
 
@@ -77,10 +80,13 @@ mod tests {
 
     #[test]
     fn a_background_picture_does_not_go_on_above_its_top() {
-        let picture = Background::Picture(Part::new(grey([1, 2], &[8.0, 2.0, 5.0])));
+        let texture = Part::new(grey([1, 2], &[8.0, 2.0, 5.0]));
+        let picture = Background::Picture { texture: texture.clone(), is_z_up: false };
         assert_eq!(background(&picture, Vec3::Y).x, 8.0);
         assert_eq!(background(&picture, Vec3::NEG_Y).x, 2.0);
         assert!((background(&picture, Vec3::Z).x - 5.0).abs() < 1e-5);
+        let picture = Background::Picture { texture, is_z_up: true };
+        assert_eq!((background(&picture, Vec3::Z).x, background(&picture, Vec3::NEG_Z).x), (8.0, 2.0));
     }
 
     #[test]

@@ -5,7 +5,7 @@ use super::read::read_options;
 use super::source::Sources;
 use crate::format;
 use crate::job::{Background, Job, LightChoice, Picture, Sequence, auto};
-use crate::math::Bounds;
+use crate::math::{Bounds, DVec3};
 use crate::scene::{self, Camera, Light, Object, Part, Shot, Texture};
 use crate::warning::Warnings;
 use rayon::prelude::*;
@@ -68,7 +68,10 @@ impl Prepared {
             Background::File(path) => {
                 let read =
                     self.backgrounds.get(path).ok_or_else(|| format!("{}: was not read", path.display()))?;
-                scene::Background::Picture(read.clone()?)
+                scene::Background::Picture {
+                    texture: read.clone()?,
+                    is_z_up: picture.settings.up == DVec3::Z,
+                }
             }
         };
         Ok(picture.settings.shot(self.camera(picture), lights, background))

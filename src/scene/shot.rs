@@ -95,7 +95,12 @@ pub enum Background {
     /// A colour, linear RGB.
     Color(Vec3),
     /// A latitude-longitude picture: −z in its middle, +x to the right of it, +y at the top.
-    Picture(Part<Texture>),
+    Picture {
+        /// The picture.
+        texture: Part<Texture>,
+        /// Whether +z is at the top instead, +y in the middle, as all that stands upright is turned by `--up z`.
+        is_z_up: bool,
+    },
 }
 
 impl Background {
@@ -105,8 +110,8 @@ impl Background {
                 h.u64(0);
                 h.slice(&[*color]);
             }
-            Self::Picture(texture) => {
-                h.u64(1);
+            Self::Picture { texture, is_z_up } => {
+                h.u64(1 + u64::from(*is_z_up));
                 h.part(texture.hash());
             }
         }
