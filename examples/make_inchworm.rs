@@ -3,12 +3,13 @@
 //!
 //! `cargo run --example make_inchworm` writes the files; with `-- --check` it tells whether those there are the same.
 
-use std::collections::{BTreeMap, BTreeSet};
+pub(crate) mod made;
+
+use made::Files;
 use std::f64::consts::{PI, TAU};
 use std::fmt::Write as _;
-use std::path::Path;
+use std::io;
 use std::process::ExitCode;
-use std::{fs, io};
 
 const FRAMES: u32 = 36;
 /// How far one cycle of the gait brings it.
@@ -241,46 +242,20 @@ fn garden(obj: &mut Obj, frame: u32) {
     }
 }
 
-/// All files, name and text.
-pub(crate) fn files() -> Vec<(String, String)> {
-    let mut files = vec![("inchworm.mtl".to_string(), MTL.to_string())];
+/// Names and contents of all files.
+pub(crate) fn files() -> Files {
+    let mut files = Files::new();
+    files.insert("inchworm.mtl".into(), MTL.into());
     for frame in 1..=FRAMES {
         let mut obj = Obj::default();
         obj.text += "# Made by examples/make_inchworm.rs\nmtllib inchworm.mtl\n";
         worm(&mut obj, frame - 1);
         garden(&mut obj, frame);
-        files.push((format!("inchworm_{frame:04}.obj"), obj.text));
+        files.insert(format!("inchworm_{frame:04}.obj"), obj.text.into_bytes());
     }
     files
 }
 
-/// The files of a folder that are not what is made, and those that are too many.
-pub(crate) fn differences(folder: &Path) -> io::Result<BTreeSet<String>> {
-    let made: BTreeMap<String, String> = files().into_iter().collect();
-    let mut different = BTreeSet::new();
-    for entry in fs::read_dir(folder)? {
-        let name = entry?.file_name().to_string_lossy().into_owned();
-        if !made.contains_key(&name) {
-            different.insert(name);
-        }
-    }
-    let is_made = |name: &str, text: &String| fs::read_to_string(folder.join(name)).is_ok_and(|t| t == *text);
-    different.extend(made.iter().filter(|(name, text)| !is_made(name, text)).map(|(name, _)| name.clone()));
-    Ok(different)
-}
-
 fn main() -> io::Result<ExitCode> {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("sequences/inchworm");
-    if std::env::args().any(|a| a == "--check") {
-        let different = differences(&folder)?;
-        for name in &different {
-            eprintln!("{}: not what this program makes", folder.join(name).display());
-        }
-        return Ok(if different.is_empty() { ExitCode::SUCCESS } else { ExitCode::FAILURE });
-    }
-    fs::create_dir_all(&folder)?;
-    for (name, text) in files() {
-        fs::write(folder.join(name), text)?;
-    }
-    Ok(ExitCode::SUCCESS)
+    made::write_or_check("inchworm", &files())
 }
