@@ -91,11 +91,11 @@ fn jpeg_is_near_and_nearer_with_quality() {
 
 #[test]
 fn gray_is_the_luma_of_the_png() {
-    let linear = |code: u8| rentix::film::color::linear_from_srgb(f64::from(code) / 255.0);
+    let linear = |code: u8| rentix::math::linear_from_srgb(f64::from(code) / 255.0);
     let colour = png(Bits::Eight, false).into_rgb8();
     let luma = colour.pixels().map(|p| {
         let [r, g, b] = p.0.map(linear);
-        255.0 * rentix::film::color::srgb_from_linear(0.2126 * r + 0.7152 * g + 0.0722 * b)
+        255.0 * rentix::math::srgb_from_linear(0.2126 * r + 0.7152 * g + 0.0722 * b)
     });
     let luma: Vec<f64> = luma.collect();
     let (pgm, pbm) = (read("pgm", Bits::Eight, false), read("pbm", Bits::Eight, false));

@@ -31,7 +31,7 @@ fn a_ball_of_each_model() {
             std::fs::create_dir_all(&golden).unwrap();
             std::fs::copy(&made, &kept).unwrap();
         }
-        let pixels = |path: &Path| image::open(path).map(|picture| picture.into_rgba8());
+        let pixels = |path: &Path| image::open(path).map(image::DynamicImage::into_rgba8);
         let made = pixels(&made).unwrap();
         if pixels(&kept).ok() != Some(made) {
             different.push(name);

@@ -109,6 +109,7 @@ impl MaterialRecord {
     }
 
     /// `d -halo f` seen under an angle of that cosine: 1 − (1 − f)·(N·V).
+    #[must_use]
     pub fn with_halo(mut self, cosine: f32) -> Self {
         self.d = 1.0 - (1.0 - self.d) * cosine.clamp(0.0, 1.0);
         self

@@ -55,6 +55,7 @@ pub struct Axis {
 
 impl Axis {
     /// The same, whole texels further.
+    #[must_use]
     pub fn moved(self, by: i32) -> Self {
         Self { low: self.low + by, ..self }
     }
