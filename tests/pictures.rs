@@ -114,13 +114,17 @@ fn exr_holds_the_film_as_it_is() {
         ("albedo.R", [0.5, 0.0]),
         ("albedo.G", [0.25, 0.0]),
         ("albedo.B", [0.125, 0.0]),
+        ("uv.U", [0.25, 0.0]),
+        ("uv.V", [-3.5, 0.0]),
+        ("coverage.A", [1.0, 0.5]),
     ] {
         assert_eq!(floats(name), values, "{name}");
     }
     let ids = |name: &str| picture.channels.iter().find(|c| c.name == name).unwrap().samples.clone();
     assert_eq!(ids("id.part"), Samples::Id(vec![3, u32::MAX]));
     assert_eq!(ids("id.triangle"), Samples::Id(vec![(1 << 24) + 1, u32::MAX]));
-    assert_eq!(picture.channels.len(), 16);
+    assert_eq!(ids("material.slot"), Samples::Id(vec![7, u32::MAX]));
+    assert_eq!(picture.channels.len(), 20);
 }
 
 #[test]
@@ -146,7 +150,7 @@ fn auxiliary_pictures_stand_beside_other_formats() {
     assert_eq!(names, [picture, Path::new("walk/a.b_0001.aov.exr")]);
     assert_eq!(names, file_names(picture, Format::Png, all));
     let layers = read_back(&files[1].bytes);
-    assert_eq!(layers.channels.len(), 12);
+    assert_eq!(layers.channels.len(), 16);
     assert!(layers.channels.iter().all(|c| c.name.contains('.')), "colour stands in the picture");
 
     let alone = [picture];

@@ -70,3 +70,40 @@ fn events_are_one_json_object_a_line() {
     assert_eq!(frame["change"]["added"], 1);
     assert_eq!(of(2)["change"]["deformed"], 1, "{}", of(2));
 }
+
+#[test]
+fn what_does_not_fit_is_refused_with_the_figures() {
+    let t = tempfile::tempdir().unwrap();
+    let t = t.path();
+    let input = wave(&t.join("w"), 2, 4, 7);
+    let said = render(t, &input, "out", &["--size", "32x18", "--memory", "8K"], 3).stderr;
+    assert!(said.contains("8192 are allowed") && said.contains("--memory"), "{said}");
+    assert!(pictures(&t.join("out")).is_empty());
+    // the frames fit one at a time, but not side by side
+    render(t, &input, "out", &["--size", "32x18", "--memory", "64K"], 0);
+    assert_eq!(pictures(&t.join("out")).len(), 2);
+
+    // 512 x 512 texels of four bytes, and a third more for their levels
+    image::RgbImage::new(512, 512).save(t.join("a.png")).unwrap();
+    std::fs::write(t.join("a.mtl"), "newmtl m\nmap_Kd a.png\n").unwrap();
+    let obj = t.join("a.obj");
+    std::fs::write(&obj, "mtllib a.mtl\nusemtl m\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nf 1/1 2/1 3/1\n")
+        .unwrap();
+    let said = render(t, &obj, "textured", &["--size", "32x18", "--memory", "1M"], 3).stderr;
+    assert!(said.contains("textures") && said.contains("1398100") && said.contains("1048576"), "{said}");
+    render(t, &obj, "textured", &["--size", "32x18", "--memory", "2M"], 0);
+}
+
+#[test]
+fn render_farms_read_progress() {
+    let t = tempfile::tempdir().unwrap();
+    let t = t.path();
+    let input = wave(&t.join("w"), 2, 4, 7);
+    for (kind, lines) in [
+        ("openjd", "openjd_progress: 50.0\nopenjd_progress: 100.0\n"),
+        ("alf", "ALF_PROGRESS 50%\nALF_PROGRESS 100%\n"),
+        ("afanasy", "PROGRESS: 50%\nPROGRESS: 100%\n"),
+    ] {
+        assert_eq!(render(t, &input, kind, &["--size", "32x18", "--progress", kind], 0).stdout, lines);
+    }
+}

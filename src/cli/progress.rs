@@ -20,12 +20,19 @@ pub(super) enum ProgressKind {
     Plain,
     /// Events as JSON on stdout, as --json.
     Json,
+    /// What Open Job Description reads: `openjd_progress: 12.5` on stdout.
+    Openjd,
+    /// What Alfred and Tractor read: `ALF_PROGRESS 12%` on stdout.
+    Alf,
+    /// What Afanasy reads: `PROGRESS: 12%` on stdout.
+    Afanasy,
     /// Nothing.
     None,
 }
 
 /// Draws progress from a run's events.
 pub(super) struct Progress {
+    kind: ProgressKind,
     bar: Option<ProgressBar>,
     plain: bool,
     verbose: bool,
@@ -60,6 +67,7 @@ impl Progress {
             bar
         });
         Self {
+            kind,
             plain: bar.is_none() && matches!(kind, ProgressKind::Auto | ProgressKind::Plain),
             bar,
             verbose,
@@ -114,6 +122,13 @@ impl Progress {
                 ms(frame.ms.encode),
                 ms(frame.ms.write),
             ));
+        }
+        let percent = 100.0 * self.ended.min(self.frames) as f64 / self.frames.max(1) as f64;
+        match self.kind {
+            ProgressKind::Openjd => println!("openjd_progress: {percent:.1}"),
+            ProgressKind::Alf => println!("ALF_PROGRESS {percent:.0}%"),
+            ProgressKind::Afanasy => println!("PROGRESS: {percent:.0}%"),
+            _ => {}
         }
         if let Some(bar) = &self.bar {
             bar.inc(1);

@@ -20,11 +20,13 @@ pub(super) fn render(args: &RenderArgs, global: &Global) -> Result<ExitCode> {
         return Ok(ExitCode::SUCCESS);
     }
     let json = global.json || args.progress == ProgressKind::Json;
-    let kind = if global.quiet || json { ProgressKind::None } else { args.progress };
+    let for_people = matches!(args.progress, ProgressKind::Auto | ProgressKind::Bar | ProgressKind::Plain);
+    let kind = if json || global.quiet && for_people { ProgressKind::None } else { args.progress };
     let mut progress = Progress::new(kind, global.verbose);
     let stop = stop::on_signals()?;
     let options = RunOptions {
         threads: threads(args),
+        memory_bytes: Some(args.memory.unwrap_or_else(machine::default_budget_bytes)),
         cold: args.cold,
         overwrite: args.overwrite,
         lenient: args.lenient,

@@ -37,7 +37,7 @@ pub(super) struct RenderArgs {
     /// Brighten by so many stops before the sRGB curve
     #[arg(long, value_name = "STOPS", allow_negative_numbers = true, help_heading = "Output")]
     pub exposure: Option<f32>,
-    /// Auxiliary pictures: depth,normal,position,albedo,id
+    /// Auxiliary pictures: depth,normal,position,albedo,id,material,uv,coverage
     #[arg(long, value_name = "LIST", value_delimiter = ',', help_heading = "Output")]
     pub aov: Option<Vec<String>>,
     /// Render finished frames anew and write over files that no run's record names
@@ -116,6 +116,9 @@ pub(super) struct RenderArgs {
     /// Threads [default: all cores]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024), help_heading = "Machine")]
     pub threads: Option<u16>,
+    /// What frames on their way may take of the host's memory, as 512M or 4G [default: half of the free memory]
+    #[arg(long, value_name = "SIZE", value_parser = size::bytes, help_heading = "Machine")]
+    pub memory: Option<u64>,
     /// What the device may hold, as 512M or 4G [default: half of the free memory]
     #[arg(long, value_name = "SIZE", value_parser = size::bytes, help_heading = "Machine")]
     pub device_memory: Option<u64>,

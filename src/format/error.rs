@@ -51,6 +51,18 @@ pub enum FormatError {
         /// What is wrong with it and what to do.
         cause: String,
     },
+    /// The textures of one frame take more memory than is allowed.
+    #[error(
+        "{}: its textures need more than {needed_bytes} bytes, {limit_bytes} are allowed; the frame is not rendered (raise --memory, or scale them down)", path.display()
+    )]
+    TexturesTooLarge {
+        /// The OBJ.
+        path: PathBuf,
+        /// What those that were looked at need.
+        needed_bytes: u64,
+        /// What is allowed.
+        limit_bytes: u64,
+    },
     /// A face that cannot be what its author meant.
     #[error("{}:{line}: {cause}; the frame is not rendered (--lenient drops the face)", path.display())]
     BadFace {

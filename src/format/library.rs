@@ -104,7 +104,7 @@ impl<'a> Loader<'a> {
             self.entries.drain().filter(|(name, _)| names.contains(&name[..])).collect();
         entries.sort_by(|(a, _), (b, _)| a.cmp(b));
         let mut maps: Vec<Vec<FoundMap>> = entries.iter_mut().map(|(_, entry)| self.maps(entry)).collect();
-        self.load_textures(&mut maps, textures, warnings);
+        self.load_textures(&mut maps, textures, warnings)?;
         let srgb = self.options.mtl_srgb;
         let materials = entries.into_iter().zip(maps).map(|((name, entry), maps)| {
             let said_in = entry.job.as_deref().or(entry.file.as_deref()).unwrap_or(self.obj);
@@ -241,14 +241,19 @@ impl<'a> Loader<'a> {
     }
 
     /// Loads the textures of all maps, each once.
-    fn load_textures(&mut self, maps: &mut [Vec<FoundMap>], cache: &TextureCache, warnings: &mut Warnings) {
+    fn load_textures(
+        &mut self,
+        maps: &mut [Vec<FoundMap>],
+        cache: &TextureCache,
+        warnings: &mut Warnings,
+    ) -> Result<(), FormatError> {
         let wanted: BTreeSet<(PathBuf, TextureUse)> = maps
             .iter()
             .flatten()
             .filter_map(|map| Some((map.path.clone()?, map.slot.texture_use())))
             .collect();
         let wanted: Vec<_> = wanted.into_iter().collect();
-        let loaded = cache.load(&wanted);
+        let loaded = cache.load(self.obj, &wanted)?;
         for ((path, _), loaded) in wanted.iter().zip(&loaded) {
             if loaded.texture.is_ok() {
                 self.note_input(path, loaded.bytes_read);
@@ -273,6 +278,7 @@ impl<'a> Loader<'a> {
                 }
             }
         }
+        Ok(())
     }
 }
 

@@ -4,10 +4,10 @@
 mod check;
 pub mod event;
 pub mod machine;
+mod memory;
 mod prepare;
 mod read;
 mod report;
-mod slots;
 mod source;
 mod trace;
 mod write;
@@ -23,8 +23,8 @@ use crate::film::Film;
 use crate::job::Job;
 use crate::output::{self, OutputError, Records, RunLog};
 use crate::warning::Warnings;
+use memory::InFlight;
 use read::ReadFrame;
-use slots::Slots;
 use std::path::PathBuf;
 use std::sync::atomic::AtomicUsize;
 use std::sync::mpsc::{channel, sync_channel};
@@ -41,6 +41,8 @@ const STAGE_THREADS_MAX: usize = 2;
 pub struct RunOptions {
     /// Threads of reading and of encoding; the device has its own.
     pub threads: usize,
+    /// Bytes of the host's memory that frames on their way may take; None: as many as they need.
+    pub memory_bytes: Option<u64>,
     /// Forget everything between frames.
     pub cold: bool,
     /// Render finished frames anew and write over files that no record names.
@@ -125,26 +127,26 @@ pub fn render(
     let reader = read::Reader::new(job, options, &records, prepared);
     let log = RunLog::create(&job.folder);
     let next = AtomicUsize::new(0);
-    let slots = Slots::new(FRAMES_READ_AHEAD);
+    let flight = InFlight::new(FRAMES_READ_AHEAD, options.memory_bytes.unwrap_or(u64::MAX));
     let threads = options.threads.clamp(1, STAGE_THREADS_MAX);
     let mut saved = report::Saver::new(options.report.clone());
 
     std::thread::scope(|scope| {
         let (note, notes) = channel::<Note>();
-        let (to_device, from_readers) = channel::<Result<ReadFrame, Box<FrameReport>>>();
+        let (to_device, from_readers) = channel::<read::Read>();
         // no queue between device and writers: a film waits in the device stage until a writer is free
         let (to_writers, from_device) = sync_channel::<Shown>(0);
         let from_device = Arc::new(Mutex::new(from_device));
         for _ in 0..threads {
             let (to_device, note) = (to_device.clone(), note.clone());
-            let (reader, next, slots) = (&reader, &next, &slots);
-            scope.spawn(move || read::read_stage(reader, next, slots, stop, &to_device, &note));
+            let (reader, next, flight) = (&reader, &next, &flight);
+            scope.spawn(move || read::read_stage(reader, next, flight, stop, &to_device, &note));
         }
         drop(to_device);
         {
-            let (note, slots, device) = (note.clone(), &slots, &mut device);
+            let (note, flight, device) = (note.clone(), &flight, &mut device);
             scope.spawn(move || {
-                trace::device_stage(&mut **device, options, &from_readers, slots, stop, &to_writers, &note);
+                trace::device_stage(&mut **device, options, &from_readers, flight, stop, &to_writers, &note);
             });
         }
         for _ in 0..threads {

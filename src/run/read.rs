@@ -1,13 +1,13 @@
 //! The reader stage: files become a frame and a shot, and finished pictures are recognised before they are traced.
 
 use super::event::{ByteCounts, FrameReport, StageTimes, Status, UpdateReport};
+use super::memory::{InFlight, expected_bytes, needed_bytes, refusal};
 use super::prepare::Prepared;
-use super::slots::Slots;
 use super::source::Sources;
 use super::{Note, RunOptions, panic_text};
 use crate::device::Stop;
 use crate::diff::Change;
-use crate::format::{Loaded, ReadOptions};
+use crate::format::{FormatError, Loaded, ReadOptions};
 use crate::job::{Job, Picture, Settings};
 use crate::output::{Bits, Encoding, Format, Records};
 use crate::scene::{Frame, Object, PartHash, PartHasher, Shot};
@@ -32,6 +32,15 @@ pub(super) struct ReadFrame {
     pub(super) picture: PathBuf,
 }
 
+/// What became of a picture's turn with a reader.
+pub(super) struct Read {
+    pub(super) index: usize,
+    /// Of the budget, taken until the frame has left the device stage.
+    pub(super) bytes: u64,
+    /// The frame; or its report, where it ends here.
+    pub(super) outcome: Result<ReadFrame, Box<FrameReport>>,
+}
+
 /// Reads the pictures of a job.
 pub(super) struct Reader<'a> {
     job: &'a Job,
@@ -44,26 +53,28 @@ pub(super) struct Reader<'a> {
 pub(super) fn read_stage(
     reader: &Reader<'_>,
     next: &AtomicUsize,
-    slots: &Slots,
+    flight: &InFlight,
     stop: &Stop,
-    to_device: &Sender<Result<ReadFrame, Box<FrameReport>>>,
+    to_device: &Sender<Read>,
     note: &Sender<Note>,
 ) {
     loop {
-        slots.take();
+        flight.take_slot();
         let index = next.fetch_add(1, Ordering::Relaxed);
         if index >= reader.job.pictures.len() || stop.asked() {
             // the other readers must come to this point too
-            slots.give();
+            flight.give_back_slot();
             return;
         }
         let mut warnings = Warnings::default();
-        let read = catch_unwind(AssertUnwindSafe(|| reader.read(index, &mut warnings)))
+        let bytes = expected_bytes(reader.job, &reader.job.pictures[index]);
+        flight.take_bytes(index, bytes);
+        let outcome = catch_unwind(AssertUnwindSafe(|| reader.read(index, bytes, &mut warnings)))
             .unwrap_or_else(|panic| Err(reader.failed(index, &panic_text("reading", &*panic))));
         if !warnings.is_empty() {
             let _ = note.send(Note::Warnings(warnings));
         }
-        if to_device.send(read).is_err() {
+        if to_device.send(Read { index, bytes, outcome }).is_err() {
             return;
         }
     }
@@ -80,9 +91,15 @@ impl<'a> Reader<'a> {
     }
 
     /// Reads one picture's frame; or its report, where it ends here: failed or finished already.
-    fn read(&self, index: usize, warnings: &mut Warnings) -> Result<ReadFrame, Box<FrameReport>> {
+    fn read(
+        &self,
+        index: usize,
+        expected_bytes: u64,
+        warnings: &mut Warnings,
+    ) -> Result<ReadFrame, Box<FrameReport>> {
         let picture = &self.job.pictures[index];
         let mut report = self.blank(index);
+        self.refuse_beyond_memory(&mut report, expected_bytes)?;
         let sources = &self.prepared.sources;
         let loaded =
             load_frame(self.job, picture, sources, self.options.lenient, self.options.strict, warnings);
@@ -94,12 +111,13 @@ impl<'a> Reader<'a> {
                 loaded.frame
             }
             Err(error) => {
-                report.status = Status::Failed;
-                report.error = Some(error);
+                report.device_failed = matches!(error, LoadError::TooLarge(_));
+                report.error = Some(error.text());
                 return Err(report);
             }
         };
         report.triangles = frame.triangles();
+        self.refuse_beyond_memory(&mut report, needed_bytes(&frame))?;
         let shot = match self.prepared.shot(picture) {
             Ok(shot) => shot,
             Err(error) => {
@@ -122,6 +140,21 @@ impl<'a> Reader<'a> {
             fingerprint,
             picture: picture.picture.clone(),
         })
+    }
+
+    fn refuse_beyond_memory(
+        &self,
+        report: &mut Box<FrameReport>,
+        needed_bytes: u64,
+    ) -> Result<(), Box<FrameReport>> {
+        match self.options.memory_bytes {
+            Some(budget_bytes) if needed_bytes > budget_bytes => {
+                report.error = Some(format!("{}: {}", report.source, refusal(needed_bytes, budget_bytes)));
+                report.device_failed = true;
+                Err(report.clone())
+            }
+            _ => Ok(()),
+        }
     }
 
     fn blank(&self, index: usize) -> Box<FrameReport> {
@@ -162,6 +195,33 @@ struct LoadedFrame {
     parse_ms: f64,
 }
 
+/// Why a frame cannot be had.
+enum LoadError {
+    /// What its files are.
+    Bad(String),
+    /// It takes more memory than is allowed: another machine may have it.
+    TooLarge(String),
+}
+
+impl LoadError {
+    fn text(self) -> String {
+        match self {
+            Self::Bad(text) | Self::TooLarge(text) => text,
+        }
+    }
+}
+
+impl From<FormatError> for LoadError {
+    fn from(error: FormatError) -> Self {
+        let text = error.to_string();
+        if matches!(error, FormatError::TexturesTooLarge { .. }) {
+            Self::TooLarge(text)
+        } else {
+            Self::Bad(text)
+        }
+    }
+}
+
 fn load_frame(
     job: &Job,
     picture: &Picture,
@@ -169,7 +229,7 @@ fn load_frame(
     lenient: bool,
     strict: bool,
     warnings: &mut Warnings,
-) -> Result<LoadedFrame, String> {
+) -> Result<LoadedFrame, LoadError> {
     let sequence = &job.sequences[picture.sequence];
     let mut all = LoadedFrame { frame: Frame::default(), bytes_read: 0, read_ms: 0.0, parse_ms: 0.0 };
     for source in &picture.sources {
@@ -178,7 +238,7 @@ fn load_frame(
         let still = layer.files.len() == 1 && job.pictures.len() > 1;
         let options = read_options(picture, layer.materials.as_deref(), lenient);
         let path = &layer.files[file].path;
-        let (loaded, first) = sources.load(path, &options, still).map_err(|e| e.to_string())?;
+        let (loaded, first) = sources.load(path, &options, still)?;
         if first {
             all.bytes_read += loaded.bytes_read;
             all.read_ms += loaded.read_ms;
@@ -187,7 +247,7 @@ fn load_frame(
             warn_of_materials(path, &loaded, warnings);
         }
         if strict && let Some(missing) = loaded.missing.first() {
-            return Err(format!("{missing}; the frame is not rendered (--strict)"));
+            return Err(LoadError::Bad(format!("{missing}; the frame is not rendered (--strict)")));
         }
         all.frame
             .objects
@@ -204,7 +264,7 @@ pub fn read_frame(
     lenient: bool,
     warnings: &mut Warnings,
 ) -> Result<Frame, String> {
-    load_frame(job, picture, sources, lenient, false, warnings).map(|l| l.frame)
+    load_frame(job, picture, sources, lenient, false, warnings).map(|l| l.frame).map_err(LoadError::text)
 }
 
 /// Names frames that nothing can be seen of.

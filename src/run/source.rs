@@ -9,6 +9,11 @@ use std::sync::{Arc, Mutex, PoisonError};
 /// A file's state as the system tells it: size and time of change.
 type Stamp = (u64, Option<FileTime>);
 
+/// How long a file is; 0 where the system does not tell.
+pub(super) fn file_bytes(path: &Path) -> u64 {
+    std::fs::metadata(path).map_or(0, |m| m.len())
+}
+
 struct Kept {
     stamp: Stamp,
     options: ReadOptions,
@@ -26,6 +31,11 @@ pub struct Sources {
 }
 
 impl Sources {
+    /// With a limit on the bytes that one frame's textures may take together.
+    pub(super) fn with_limit(texture_bytes: Option<u64>) -> Self {
+        Self { textures: TextureCache::with_limit(texture_bytes), ..Self::default() }
+    }
+
     /// Loads an OBJ before its picture's turn and keeps it until then.
     pub(super) fn ahead(&self, path: &Path, options: &ReadOptions) -> Result<Arc<Loaded>, FormatError> {
         self.get(path, options, true, false).map(|(loaded, _)| loaded)

@@ -1,9 +1,9 @@
 //! The device stage: what changed, what the device must do, trace.
 
-use super::event::{FrameReport, Status};
-use super::read::ReadFrame;
+use super::event::Status;
+use super::memory::InFlight;
+use super::read::{Read, ReadFrame};
 use super::report::DeviceReport;
-use super::slots::Slots;
 use super::{Note, RunOptions, Shown, panic_text};
 use crate::clock::Stopwatch;
 use crate::device::{Device, DeviceError, Stop};
@@ -20,8 +20,8 @@ use std::sync::mpsc::{Receiver, Sender, SyncSender};
 pub(super) fn device_stage(
     device: &mut dyn Device,
     options: &RunOptions,
-    from_readers: &Receiver<Result<ReadFrame, Box<FrameReport>>>,
-    slots: &Slots,
+    from_readers: &Receiver<Read>,
+    flight: &InFlight,
     stop: &Stop,
     to_writers: &SyncSender<Shown>,
     note: &Sender<Note>,
@@ -36,20 +36,21 @@ pub(super) fn device_stage(
     let mut waiting = BTreeMap::new();
     let mut turn = 0;
     for read in from_readers {
-        let index = read.as_ref().map_or_else(|r| r.index, |r| r.report.index);
-        waiting.insert(index, read);
-        while let Some(read) = waiting.remove(&turn) {
+        waiting.insert(read.index, read);
+        while let Some(Read { bytes, outcome, .. }) = waiting.remove(&turn) {
             turn += 1;
-            slots.give();
-            let mut read = match read {
-                _ if stop.asked() => continue,
+            flight.give_slot();
+            let traced = match outcome {
+                _ if stop.asked() => None,
                 Err(report) => {
                     let _ = note.send(Note::Frame(report));
-                    continue;
+                    None
                 }
-                Ok(read) => read,
+                Ok(mut read) => Some((stage.frame(&mut read, stop), read)),
             };
-            match stage.frame(&mut read, stop) {
+            flight.give_bytes(bytes);
+            let Some((film, mut read)) = traced else { continue };
+            match film {
                 Ok(film) => {
                     // the writers outlive this stage
                     let _ = to_writers.send(Shown { film, read });

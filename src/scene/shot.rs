@@ -53,6 +53,15 @@ impl Aov {
         Self::Coverage,
     ];
 
+    /// How many numbers of 32 bits it has in a pixel.
+    pub fn channels(self) -> u64 {
+        match self {
+            Self::Depth | Self::Material | Self::Coverage => 1,
+            Self::Id | Self::Uv => 2,
+            Self::Normal | Self::Position | Self::Albedo => 3,
+        }
+    }
+
     /// The word on the command line and in the job file.
     pub fn word(self) -> &'static str {
         match self {

@@ -27,14 +27,15 @@ pub(super) fn triangulate(positions: &[[f32; 3]], corners: &[u32], out: &mut Vec
             }
         }
         _ => {
-            let points: Vec<DVec3> = corners.iter().map(|&corner| at(corner) - origin).collect();
             // the sum over the fan is Newell's sum over the edges (Sutherland et al. 1974), seen from the first corner
-            let fan = || points[1..].windows(2).map(|pair| pair[0].cross(pair[1]));
+            let point = |corner: &u32| at(*corner) - origin;
+            let fan = || corners[1..].windows(2).map(|pair| point(&pair[0]).cross(point(&pair[1])));
             let normal: DVec3 = fan().sum();
             let is_fan = normal == DVec3::ZERO || fan().all(|n| n.dot(normal) > 0.0);
-            if is_fan || points.len() > MAX_EAR_CORNERS {
-                out.extend((1..points.len() as u32 - 1).map(|i| [0, i, i + 1]));
+            if is_fan || corners.len() > MAX_EAR_CORNERS {
+                out.extend((1..corners.len() as u32 - 1).map(|i| [0, i, i + 1]));
             } else {
+                let points: Vec<DVec3> = corners.iter().map(point).collect();
                 clip_ears(&in_plane(&points, normal), out);
             }
         }

@@ -5,6 +5,7 @@ use exr::prelude::{AnyChannel, FlatSamples, MetaData, ReadChannels, ReadLayers, 
 use image::{DynamicImage, ImageDecoder, ImageError, ImageFormat, ImageReader, Limits};
 use std::io::Cursor;
 use std::path::Path;
+use std::sync::atomic::{AtomicU64, Ordering};
 
 /// The greatest width and height of a texture.
 pub(super) const MAX_SIDE: u32 = 16_384;
@@ -42,13 +43,48 @@ pub(super) enum Level {
 }
 
 /// Decodes a picture, known by its first bytes, or by its name where those say nothing. An error is what is wrong, to
-/// stand behind the file's name.
-pub(super) fn decode(bytes: &[u8], path: &Path) -> Result<Picture, String> {
-    if bytes.starts_with(&EXR_MAGIC) { decode_exr(bytes) } else { decode_image(bytes, path) }
+/// stand behind the file's name. The memory for its texels is taken from the room first.
+pub(super) fn decode(bytes: &[u8], path: &Path, room: &Room) -> Result<Picture, String> {
+    if bytes.starts_with(&EXR_MAGIC) { decode_exr(bytes, room) } else { decode_image(bytes, path, room) }
+}
+
+/// Memory that pictures decoded at the same time share.
+#[derive(Debug)]
+pub(super) struct Room {
+    limit_bytes: u64,
+    taken_bytes: AtomicU64,
+}
+
+impl Room {
+    pub(super) fn new(limit_bytes: u64) -> Self {
+        Self { limit_bytes, taken_bytes: AtomicU64::new(0) }
+    }
+
+    /// Takes so many bytes.
+    pub(super) fn take(&self, bytes: u64) {
+        self.taken_bytes.fetch_add(bytes, Ordering::Relaxed);
+    }
+
+    /// Bytes that were wanted, where they are more than there are.
+    pub(super) fn exceeded(&self) -> Option<u64> {
+        Some(self.taken_bytes.load(Ordering::Relaxed)).filter(|taken| *taken > self.limit_bytes)
+    }
+
+    fn take_levels(&self, texels: u64, texel_bytes: u64) -> Result<(), String> {
+        // all levels together have a third more
+        self.take(texels.saturating_mul(texel_bytes) / 3 * 4);
+        self.exceeded().map_or(Ok(()), |_| Err("does not fit".to_owned()))
+    }
 }
 
 /// Refuses pictures that are too large, or larger than so few bytes of file can mean, before they take memory.
-fn check_size(width: u64, height: u64, texel_bytes: u64, file_bytes: usize) -> Result<(), String> {
+fn check_size(
+    width: u64,
+    height: u64,
+    texel_bytes: u64,
+    file_bytes: usize,
+    room: &Room,
+) -> Result<(), String> {
     if width == 0 || height == 0 {
         return Err(format!("has {width} x {height} texels, none at all"));
     }
@@ -64,10 +100,10 @@ fn check_size(width: u64, height: u64, texel_bytes: u64, file_bytes: usize) -> R
             "is broken: it says {width} x {height} texels, more than its {file_bytes} bytes can hold"
         ));
     }
-    Ok(())
+    room.take_levels(width * height, texel_bytes)
 }
 
-fn decode_image(bytes: &[u8], path: &Path) -> Result<Picture, String> {
+fn decode_image(bytes: &[u8], path: &Path, room: &Room) -> Result<Picture, String> {
     let broken = |error: ImageError| match error {
         ImageError::Limits(_) => {
             format!("is too large: at most {MAX_SIDE} texels a side are taken, scale it down")
@@ -86,7 +122,7 @@ fn decode_image(bytes: &[u8], path: &Path) -> Result<Picture, String> {
     let sample_bytes = u64::from(color.bytes_per_pixel() / color.channel_count());
     // finer integers are held as floats
     let held_bytes = if sample_bytes == 1 { 4 } else { 16 };
-    check_size(width.into(), height.into(), held_bytes, bytes.len())?;
+    check_size(width.into(), height.into(), held_bytes, bytes.len(), room)?;
     let image = DynamicImage::from_decoder(decoder).map_err(broken)?;
     let size = [image.width(), image.height()];
     let texels = match sample_bytes {
@@ -133,12 +169,12 @@ fn finite(x: f32) -> f32 {
 }
 
 /// The first layer: its R, G, B and A, or Y for all colours.
-fn decode_exr(bytes: &[u8]) -> Result<Picture, String> {
+fn decode_exr(bytes: &[u8], room: &Room) -> Result<Picture, String> {
     let broken = |error: exr::error::Error| format!("is broken: {error}");
     let meta = MetaData::read_from_buffered(Cursor::new(bytes), false).map_err(broken)?;
     for Header { layer_size, channels, .. } in &meta.headers {
         let channels = channels.list.len().max(4) as u64;
-        check_size(layer_size.0 as u64, layer_size.1 as u64, 4 * channels, bytes.len())?;
+        check_size(layer_size.0 as u64, layer_size.1 as u64, 4 * channels, bytes.len(), room)?;
     }
     let image = read()
         .no_deep_data()

@@ -7,7 +7,7 @@ use super::error::FormatError;
 use super::text;
 use crate::clock::FileTime;
 use crate::scene::{Part, TexelSpace, Texels, Texture};
-use decode::Picture;
+use decode::{Picture, Room};
 use rayon::prelude::*;
 use std::collections::{HashMap, HashSet};
 use std::fs;
@@ -35,6 +35,7 @@ pub(super) enum TextureUse {
 #[derive(Debug, Default)]
 pub struct TextureCache {
     held: Mutex<Held>,
+    limit_bytes: Option<u64>,
 }
 
 #[derive(Debug, Default)]
@@ -67,8 +68,20 @@ pub(super) struct LoadedTexture {
 }
 
 impl TextureCache {
-    /// The textures in those files, each decoded where it is not held.
-    pub(super) fn load(&self, wanted: &[(PathBuf, TextureUse)]) -> Vec<LoadedTexture> {
+    /// One that refuses textures of one load that take more than so many bytes together, mip levels included.
+    pub fn with_limit(limit_bytes: Option<u64>) -> Self {
+        Self { limit_bytes, ..Self::default() }
+    }
+
+    /// The textures in those files, each decoded where it is not held. `obj` is what they are loaded for.
+    ///
+    /// # Errors
+    /// Where all of them together are beyond the limit; what was to be decoded is then not kept.
+    pub(super) fn load(
+        &self,
+        obj: &Path,
+        wanted: &[(PathBuf, TextureUse)],
+    ) -> Result<Vec<LoadedTexture>, FormatError> {
         let keys: Vec<_> = wanted.iter().map(|(path, texture_use)| key(path, *texture_use)).collect();
         let mut held = self.held.lock().unwrap_or_else(PoisonError::into_inner);
         held.loads += 1;
@@ -76,8 +89,17 @@ impl TextureCache {
         // two names of one file have one key
         let absent: HashSet<&Key> =
             keys.iter().flatten().filter(|key| !held.textures.contains_key(key)).collect();
+        let limit_bytes = self.limit_bytes.unwrap_or(u64::MAX);
+        let room = Room::new(limit_bytes);
+        let present: HashSet<&Key> = keys.iter().flatten().filter(|key| !absent.contains(key)).collect();
+        for entry in present.into_iter().filter_map(|key| held.textures.get(key)) {
+            room.take(entry.texture.as_ref().map_or(0, Part::bytes));
+        }
         let mut decoded: HashMap<&Key, _> =
-            absent.into_par_iter().map(|key| (key, decoded(&key.path, key.texture_use))).collect();
+            absent.into_par_iter().map(|key| (key, decoded(&key.path, key.texture_use, &room))).collect();
+        if let Some(needed_bytes) = room.exceeded() {
+            return Err(FormatError::TexturesTooLarge { path: obj.to_path_buf(), needed_bytes, limit_bytes });
+        }
         let mut textures = Vec::with_capacity(keys.len());
         for key in &keys {
             textures.push(match key {
@@ -86,7 +108,7 @@ impl TextureCache {
             });
         }
         held.textures.retain(|_, entry| entry.last_load + KEPT_LOADS > this_load);
-        textures
+        Ok(textures)
     }
 }
 
@@ -118,14 +140,14 @@ fn key(path: &Path, texture_use: TextureUse) -> Result<Key, FormatError> {
 
 /// Reads a picture of colours, for the background: 8-bit ones are sRGB.
 pub fn load_picture(path: &Path) -> Result<Part<Texture>, FormatError> {
-    decoded(path, TextureUse::Color)
+    decoded(path, TextureUse::Color, &Room::new(u64::MAX))
 }
 
 /// Reads and decodes a file.
-fn decoded(path: &Path, texture_use: TextureUse) -> Result<Part<Texture>, FormatError> {
+fn decoded(path: &Path, texture_use: TextureUse, room: &Room) -> Result<Part<Texture>, FormatError> {
     let bytes = text::read(path)?;
     // decoders are other people's code: what they do on broken files must not end the run
-    let picture = catch_unwind(AssertUnwindSafe(|| decode::decode(&bytes, path)))
+    let picture = catch_unwind(AssertUnwindSafe(|| decode::decode(&bytes, path, room)))
         .unwrap_or_else(|_| Err("is broken, its decoder gave up on it".to_owned()));
     picture
         .map(|picture| Part::new(texture(picture, texture_use)))
