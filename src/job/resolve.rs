@@ -59,7 +59,7 @@ pub fn resolve(request: &Request) -> Result<Job, JobError> {
     }
     let name = name.unwrap_or_default();
 
-    job.place_in_folders()?;
+    job.place_in_folders();
     job.choose(job_file.frames.as_ref())?;
     job.inputs.extend(
         job.sequences
@@ -114,7 +114,8 @@ impl Resolving<'_> {
             let picture = picture_path(&settings, "{stem}", with)?;
             pictures.push(Picture { sequence, frame: file.number, sources, picture, settings });
         }
-        self.add(files.name, vec![layer], pictures)
+        self.add(files.name, vec![layer], pictures);
+        Ok(())
     }
 
     /// All layers in one sequence: a picture for each frame of the job, else of the longest layer.
@@ -168,19 +169,15 @@ impl Resolving<'_> {
             let picture = picture_path(&settings, "{name}_{frame:04}", with)?;
             pictures.push(Picture { sequence: 0, frame: Some(frame), sources, picture, settings });
         }
-        self.add(job_name.to_string(), layers, pictures)
+        self.add(job_name.to_string(), layers, pictures);
+        Ok(())
     }
 
-    fn add(&mut self, name: String, layers: Vec<Layer>, pictures: Vec<Picture>) -> Result<(), JobError> {
-        let mut seen = HashSet::new();
-        if let Some(twice) = pictures.iter().find(|p| !seen.insert(&p.picture)) {
-            return Err(JobError::TwoOfAName(twice.picture.clone()));
-        }
+    fn add(&mut self, name: String, layers: Vec<Layer>, pictures: Vec<Picture>) {
         if let Some(first) = pictures.first().cloned() {
             self.sequences.push(Sequence { name, layers, first });
             self.pictures.extend(pictures);
         }
-        Ok(())
     }
 
     /// Defaults, then the job, then its overrides in turn, then the command line. An override of files is for
@@ -210,12 +207,12 @@ impl Resolving<'_> {
     }
 
     /// Where several sequences would write one name, each gets a folder of its own.
-    fn place_in_folders(&mut self) -> Result<(), JobError> {
+    fn place_in_folders(&mut self) {
         let mut owner: HashMap<&Path, usize> = HashMap::new();
         let clash =
             self.pictures.iter().any(|p| *owner.entry(&p.picture).or_insert(p.sequence) != p.sequence);
         if !clash {
-            return Ok(());
+            return;
         }
         let mut taken: HashSet<String> = HashSet::new();
         let folders: Vec<String> = self
@@ -230,14 +227,10 @@ impl Resolving<'_> {
         for p in &mut self.pictures {
             p.picture = Path::new(&folders[p.sequence]).join(&p.picture);
         }
-        let mut seen = HashSet::new();
-        match self.pictures.iter().find(|p| !seen.insert(&p.picture)) {
-            Some(twice) => Err(JobError::TwoOfAName(twice.picture.clone())),
-            None => Ok(()),
-        }
     }
 
-    /// `--frames`, else the job's, then `--chunk`, then `--order`.
+    /// `--frames`, else the job's, then `--chunk`, then `--order`. Names are compared before the chunk is taken: all
+    /// chunks write into one folder.
     fn choose(&mut self, of_job: Option<&FrameSet>) -> Result<(), JobError> {
         if let Some(set) = self.request.frames.as_ref().or(of_job) {
             let mut numbers: Vec<i64> = self.pictures.iter().filter_map(|p| p.frame).collect();
@@ -246,6 +239,10 @@ impl Resolving<'_> {
                 return Err(JobError::NoSuchFrame(missing));
             }
             self.pictures.retain(|p| p.frame.is_some_and(|f| set.contains(f)));
+        }
+        let mut seen = HashSet::new();
+        if let Some(twice) = self.pictures.iter().find(|p| !seen.insert(&p.picture)) {
+            return Err(JobError::TwoOfAName(twice.picture.clone()));
         }
         if let Some(chunk) = self.request.chunk {
             self.pictures = self.pictures[chunk.range(self.pictures.len())].to_vec();
