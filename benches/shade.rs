@@ -10,7 +10,7 @@ use rentix::device::cpu::CpuDevice;
 use rentix::device::{Device, Stop};
 use rentix::kernel::camera::{CameraConstants, camera_ray};
 use rentix::math::{DVec3, Vec3};
-use rentix::plan::plan_frame;
+use rentix::plan::{Wishes, plan_frame};
 use rentix::scene::{
     AovSet, Background, Camera, Faces, Falloff, Filter, Frame, Geometry, Light, Material, MaterialRuns, Mesh,
     Object, Part, Positions, Shot, Triangles,
@@ -68,7 +68,7 @@ fn main() {
         };
         let shot = shot(camera, light);
         let mut device = CpuDevice::new(0, u64::MAX).expect("threads");
-        let plan = plan_frame(&frame, device.residency(), false);
+        let plan = plan_frame(&frame, device.residency(), &Wishes::default());
         let cost = device.apply(&plan, &frame).expect("no budget");
         let ms = median(runs, || black_box(device.trace(&frame, &shot, &Stop::default()).expect("resident")));
         println!(

@@ -37,8 +37,10 @@ fn main() {
     let camera = Camera::new(&o, &positions);
     println!("{}: {} triangles, {} threads", o.file, triangles.len(), rayon::current_num_threads());
     for quality in Quality::ALL.into_iter().filter(|q| o.quality.is_none_or(|o| o == *q)) {
-        let (build, tree) = measure(o.runs, || Tree::build(&positions, &triangles, quality));
-        println!("{quality:?}: build {build}, {:.1} MB, {:?}", tree.bytes() as f64 / 1e6, tree.counts());
+        let (build, mut tree) = measure(o.runs, || Tree::build(&positions, &triangles, quality));
+        let (refit, ()) = measure(o.runs, || tree.refit(&positions, &triangles));
+        let megabytes = tree.bytes() as f64 / 1e6;
+        println!("{quality:?}: build {build}, refit {refit}, {megabytes:.1} MB, {:?}", tree.counts());
         let scene = TracedScene::new(vec![TracedObject::new(Arc::new(tree), None)]);
         for &width in Width::available() {
             let scene = scene.clone().with_width(width);

@@ -4,7 +4,7 @@
 use rentix::device::cpu::CpuDevice;
 use rentix::device::{Device, Stop};
 use rentix::math::{DVec3, Vec3};
-use rentix::plan::plan_frame;
+use rentix::plan::{Wishes, plan_frame};
 use rentix::scene::{
     AovSet, Background, Camera, Faces, Falloff, Filter, Frame, Geometry, Light, Material, MaterialRuns, Mesh,
     Object, Part, Positions, Shot, Triangles,
@@ -249,7 +249,7 @@ fn turned(p: DVec3, angle: f64) -> DVec3 {
 fn compare(bodies: &Bodies, shot: &Shot, least: f64) {
     let frame = Frame { objects: vec![Object { geometry: Arc::new(bodies.geometry()), transform: None }] };
     let mut device = CpuDevice::new(2, 1 << 24).unwrap();
-    let plan = plan_frame(&frame, device.residency(), false);
+    let plan = plan_frame(&frame, device.residency(), &Wishes::default());
     device.apply(&plan, &frame).unwrap();
     let film = device.trace(&frame, shot, &Stop::default()).unwrap().film;
     let mut reference = Reference { bodies, shot, margin: 0.0 };

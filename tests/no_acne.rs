@@ -4,7 +4,7 @@
 use rentix::device::cpu::CpuDevice;
 use rentix::device::{Device, Stop};
 use rentix::math::{DVec3, Vec3};
-use rentix::plan::plan_frame;
+use rentix::plan::{Wishes, plan_frame};
 use rentix::scene::{
     Aov, AovSet, Background, Camera, Faces, Falloff, Filter, Frame, Geometry, Light, Material, MaterialRuns,
     Mesh, Object, Part, Positions, Shot, Triangles,
@@ -56,7 +56,7 @@ fn dark_pixels(frame: &Frame, eye: DVec3, look_at: DVec3) -> (usize, usize) {
         aovs,
     };
     let mut device = CpuDevice::new(1, 1 << 30).unwrap();
-    let plan = plan_frame(frame, device.residency(), false);
+    let plan = plan_frame(frame, device.residency(), &Wishes::default());
     device.apply(&plan, frame).unwrap();
     let film = device.trace(frame, &shot, &Stop::default()).unwrap().film;
     let depth = film.aovs.depth.unwrap();

@@ -4,7 +4,7 @@
 use rentix::device::cpu::CpuDevice;
 use rentix::device::{Device, Stop};
 use rentix::math::{DVec3, Vec3};
-use rentix::plan::plan_frame;
+use rentix::plan::{Wishes, plan_frame};
 use rentix::scene::{
     ABSENT, AovSet, Attribute, Background, Camera, Corners, Faces, Falloff, Filter, Frame, Geometry, Light,
     Material, MaterialRuns, Mesh, Normals, Object, Part, Positions, Shot, Triangles,
@@ -294,7 +294,7 @@ fn every_pixel_away_from_borders() {
         let frame = Frame { objects: vec![Object { geometry: Arc::new(geometry), transform: None }] };
         let shot = shot();
         let mut device = CpuDevice::new(2, 1 << 24).unwrap();
-        let plan = plan_frame(&frame, device.residency(), false);
+        let plan = plan_frame(&frame, device.residency(), &Wishes::default());
         device.apply(&plan, &frame).unwrap();
         let film = device.trace(&frame, &shot, &Stop::default()).unwrap().film;
         for (i, rgb) in film.rgb.iter().enumerate() {

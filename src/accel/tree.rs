@@ -59,6 +59,7 @@ pub struct Tree {
     pub(crate) vertex_box: Aabb,
     /// The box of the root's children.
     pub(crate) bounds: Aabb,
+    pub(crate) cost: f64,
 }
 
 /// How large a tree is.
@@ -96,6 +97,12 @@ impl Tree {
     /// Triangles that it was built over, with and without area.
     pub fn triangle_count(&self) -> u32 {
         self.triangle_count
+    }
+
+    /// Its surface-area cost: the surfaces of all children over the whole's (Goldsmith and Salmon 1987); how many
+    /// boxes a ray that meets the whole meets on average. 0 where the whole has no surface.
+    pub fn cost(&self) -> f64 {
+        self.cost
     }
 
     /// The box of the corners of all triangles that can be hit.

@@ -28,6 +28,7 @@ pub(super) fn render(args: &RenderArgs, global: &Global) -> Result<ExitCode> {
         threads: threads(args),
         memory_bytes: Some(args.memory.unwrap_or_else(machine::default_budget_bytes)),
         cold: args.cold,
+        update: args.update.into(),
         overwrite: args.overwrite,
         lenient: args.lenient,
         strict: args.strict,

@@ -2,8 +2,30 @@
 
 use super::progress::ProgressKind;
 use super::size;
+use crate::plan::Update;
 use clap::Args;
 use std::path::PathBuf;
+
+/// `--update`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+pub(super) enum UpdateWord {
+    /// What is expected to take the least time
+    Auto,
+    /// Refit wherever the faces are the same
+    Refit,
+    /// Build anew
+    Rebuild,
+}
+
+impl From<UpdateWord> for Update {
+    fn from(word: UpdateWord) -> Self {
+        match word {
+            UpdateWord::Auto => Self::Auto,
+            UpdateWord::Refit => Self::Refit,
+            UpdateWord::Rebuild => Self::Rebuild,
+        }
+    }
+}
 
 /// What `render` takes. Options win over the job file.
 #[derive(Args, Debug)]
@@ -122,6 +144,15 @@ pub(super) struct RenderArgs {
     /// What the device may hold, as 512M or 4G [default: half of the free memory]
     #[arg(long, value_name = "SIZE", value_parser = size::bytes, help_heading = "Machine")]
     pub device_memory: Option<u64>,
+    /// Trees over meshes that changed: auto, refit or rebuild [default: auto]
+    #[arg(
+        long,
+        value_name = "HOW",
+        default_value = "auto",
+        hide_default_value = true,
+        help_heading = "Machine"
+    )]
+    pub update: UpdateWord,
     /// Forget everything between frames, for comparison
     #[arg(long, help_heading = "Machine")]
     pub cold: bool,

@@ -3,7 +3,7 @@
 
 use super::{Device, DeviceError, DeviceInfo, DeviceKind, RayCounts, Stop, Traced, UpdateCost};
 use crate::film::Film;
-use crate::plan::{Residency, Step, UpdatePlan, tree_name};
+use crate::plan::{Residency, Step, TreeState, UpdatePlan, tree_name};
 use crate::scene::{Background, Frame, Object, PartHash, Shot};
 use std::collections::BTreeMap;
 
@@ -104,12 +104,14 @@ impl Device for FakeDevice {
                     uploaded_bytes += bytes;
                     self.residency.hold(part, bytes);
                 }
-                Step::Build { tree, triangles, .. } => {
-                    self.residency.hold(tree, triangles * TREE_BYTES_PER_TRIANGLE);
+                Step::Refit { from, tree, .. } => self.residency.refit(from, tree, 1.0),
+                Step::Build { tree, triangles, object } => {
+                    let state = TreeState::built(&frame.objects[object].geometry, 1.0);
+                    self.residency.hold_tree(tree, triangles * TREE_BYTES_PER_TRIANGLE, state);
                 }
             }
         }
-        Ok(UpdateCost { uploaded_bytes, upload_ms: None, update_ms: None })
+        Ok(UpdateCost { uploaded_bytes, ..UpdateCost::default() })
     }
 
     fn trace(&mut self, frame: &Frame, shot: &Shot, stop: &Stop) -> Result<Traced, DeviceError> {
@@ -139,10 +141,10 @@ impl Device for FakeDevice {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::plan::plan_frame;
+    use crate::plan::{Wishes, plan_frame};
 
     fn apply(device: &mut FakeDevice, frame: &Frame) -> Result<UpdateCost, DeviceError> {
-        let plan = plan_frame(frame, device.residency(), false);
+        let plan = plan_frame(frame, device.residency(), &Wishes::default());
         device.apply(&plan, frame)
     }
 

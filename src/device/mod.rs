@@ -71,6 +71,29 @@ pub struct UpdateCost {
     pub upload_ms: Option<f64>,
     /// Building and refitting, ms.
     pub update_ms: Option<f64>,
+    /// What was built.
+    pub built: Work,
+    /// What was refitted and kept.
+    pub refitted: Work,
+    /// The surface-area cost of the frame's trees over that of their last builds, by triangles; None without trees.
+    pub cost_ratio: Option<f64>,
+}
+
+/// Triangles that something was done with, and how long it took.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Work {
+    /// Triangles.
+    pub triangles: u64,
+    /// Milliseconds.
+    pub ms: f64,
+}
+
+impl Work {
+    /// Adds to it.
+    pub fn add(&mut self, triangles: u64, ms: f64) {
+        self.triangles += triangles;
+        self.ms += ms;
+    }
 }
 
 /// A traced frame and what it cost.

@@ -1,13 +1,79 @@
 //! What a device must do before it can trace a frame, as a value that can be printed, tested and replayed. Pure.
 
+mod policy;
+
+pub use policy::{Costs, Update};
+
 use crate::scene::{Frame, Geometry, PartHash, PartHasher};
+use policy::{Choice, candidate, choose};
 use std::collections::{BTreeMap, BTreeSet};
+
+/// What is known of a tree that a device holds.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TreeState {
+    /// The faces that it stands over.
+    pub faces: PartHash,
+    /// Triangles.
+    pub triangles: u64,
+    /// Surface-area cost when it was built.
+    pub built_cost: f64,
+    /// Surface-area cost now.
+    pub cost: f64,
+    /// Sum over the frames since the build of [`Self::ratio`] − 1.
+    pub excess: f64,
+}
+
+impl TreeState {
+    /// Of a tree that was just built.
+    pub fn built(geometry: &Geometry, cost: f64) -> Self {
+        let triangles = geometry.triangles.0.len() as u64;
+        Self { faces: geometry.faces.hash(), triangles, built_cost: cost, cost, excess: 0.0 }
+    }
+
+    /// The same after a refit that has this cost.
+    #[must_use]
+    pub fn refitted(self, cost: f64) -> Self {
+        let now = Self { cost, ..self };
+        Self { excess: (self.excess + now.ratio() - 1.0).max(0.0), ..now }
+    }
+
+    /// The surface-area cost over that of the last build; 1 where there is none.
+    pub fn ratio(&self) -> f64 {
+        if self.cost <= 0.0 {
+            1.0
+        } else if self.built_cost <= 0.0 {
+            f64::INFINITY
+        } else {
+            self.cost / self.built_cost
+        }
+    }
+}
+
+/// How a frame is to be made resident.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Wishes {
+    /// Forget everything first.
+    pub cold: bool,
+    /// What is to be done with trees over meshes that changed.
+    pub update: Update,
+    /// What things cost.
+    pub costs: Costs,
+}
+
+impl Wishes {
+    /// Forget everything first.
+    pub fn cold() -> Self {
+        Self { cold: true, ..Self::default() }
+    }
+}
 
 /// What a device holds: parts and trees with their bytes, and the counts of the report.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Residency {
     /// Bytes by name; trees stand under [`tree_name`].
     pub held: BTreeMap<PartHash, u64>,
+    /// What is known of the trees among them.
+    pub trees: BTreeMap<PartHash, TreeState>,
     /// The most bytes ever held.
     pub peak_bytes: u64,
     /// Parts and trees that were there when a frame needed them.
@@ -36,14 +102,30 @@ impl Residency {
         self.peak_bytes = self.peak_bytes.max(self.bytes());
     }
 
+    /// A tree was built.
+    pub fn hold_tree(&mut self, name: PartHash, bytes: u64, state: TreeState) {
+        self.hold(name, bytes);
+        self.trees.insert(name, state);
+    }
+
+    /// A tree was fitted to other positions and has another name now; it counts as there.
+    pub fn refit(&mut self, from: PartHash, to: PartHash, cost: f64) {
+        self.hits += 1;
+        if let (Some(bytes), Some(state)) = (self.held.remove(&from), self.trees.remove(&from)) {
+            self.held.insert(to, bytes);
+            self.trees.insert(to, state.refitted(cost));
+        }
+    }
+
     /// Gives up a part or tree.
     pub fn free(&mut self, name: PartHash) {
         self.held.remove(&name);
+        self.trees.remove(&name);
     }
 }
 
 /// One step of a plan.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Step {
     /// Give up a part or tree.
     Free {
@@ -61,6 +143,19 @@ pub enum Step {
         part: PartHash,
         /// Its bytes.
         bytes: u64,
+    },
+    /// Fit a tree to an object's positions in place.
+    Refit {
+        /// The tree as it is held.
+        from: PartHash,
+        /// Its name afterwards.
+        tree: PartHash,
+        /// The object, by its place in the frame.
+        object: usize,
+        /// Triangles.
+        triangles: u64,
+        /// Where the surface-area cost over the last build's turns out greater, it is built anew.
+        keep_up_to: f64,
     },
     /// Build the tree over an object's triangles.
     Build {
@@ -80,6 +175,8 @@ pub enum Action {
     Load,
     /// No tree had to be touched.
     None,
+    /// Trees are fitted to other positions, none is built.
+    Refit,
     /// At least one tree is built anew.
     Rebuild,
 }
@@ -90,6 +187,7 @@ impl Action {
         match self {
             Self::Load => "load",
             Self::None => "none",
+            Self::Refit => "refit",
             Self::Rebuild => "rebuild",
         }
     }
@@ -106,19 +204,23 @@ pub struct UpdatePlan {
     pub why: String,
     /// Bytes that the device will hold of parts after it; trees not counted.
     pub part_bytes: u64,
+    /// What builds and refits are expected to take, ms.
+    pub predicted_ms: f64,
 }
 
 impl UpdatePlan {
     /// Whether something that the frame needs was resident already.
     pub fn is_warm(&self) -> bool {
-        self.steps.iter().any(|s| matches!(s, Step::Keep { .. }))
+        self.steps.iter().any(|s| matches!(s, Step::Keep { .. } | Step::Refit { .. }))
     }
 
     /// Bytes that will be held after it, trees that are to be built estimated at so many bytes a triangle.
     pub fn needed_bytes(&self, residency: &Residency, tree_bytes_per_triangle: u64) -> u64 {
         let of_step = |step: &Step| match step {
             Step::Free { .. } => 0,
-            Step::Keep { name } => residency.held.get(name).copied().unwrap_or(0),
+            Step::Keep { name } | Step::Refit { from: name, .. } => {
+                residency.held.get(name).copied().unwrap_or(0)
+            }
             Step::Upload { bytes, .. } => *bytes,
             Step::Build { triangles, .. } => triangles * tree_bytes_per_triangle,
         };
@@ -134,45 +236,72 @@ pub fn tree_name(geometry: &Geometry) -> PartHash {
     h.finish()
 }
 
-/// Plans a frame: what is resident is kept, what is missing is uploaded or built, what the frame does not use is
-/// freed. With `cold` everything is forgotten first.
-pub fn plan_frame(frame: &Frame, residency: &Residency, cold: bool) -> UpdatePlan {
+/// Plans a frame: what is resident is kept, trees over meshes that only moved are refitted where that is expected to take
+/// less time, what is missing is uploaded or built, what the frame does not use is freed.
+pub fn plan_frame(frame: &Frame, residency: &Residency, wishes: &Wishes) -> UpdatePlan {
+    let Wishes { cold, update, costs } = wishes;
     let mut needed: BTreeMap<PartHash, u64> = BTreeMap::new();
-    let mut trees: BTreeMap<PartHash, (usize, u64)> = BTreeMap::new();
+    let mut trees: BTreeMap<PartHash, usize> = BTreeMap::new();
     for (i, object) in frame.objects.iter().enumerate() {
         needed.extend(object.geometry.parts());
-        trees.entry(tree_name(&object.geometry)).or_insert((i, object.geometry.triangles.0.len() as u64));
+        trees.entry(tree_name(&object.geometry)).or_insert(i);
     }
     let used: BTreeSet<PartHash> = needed.keys().chain(trees.keys()).copied().collect();
     let is_held = |name: &PartHash| !cold && residency.held.contains_key(name);
 
-    let mut steps: Vec<Step> = residency
-        .held
-        .keys()
-        .filter(|n| cold || !used.contains(n))
-        .map(|&name| Step::Free { name })
-        .collect();
+    let mut taken = BTreeSet::new();
+    let mut tree_steps = Vec::new();
+    let mut why = Vec::new();
+    let mut predicted_ms = 0.0;
+    for (&tree, &object) in &trees {
+        let geometry = &frame.objects[object].geometry;
+        let triangles = geometry.triangles.0.len() as u64;
+        if is_held(&tree) {
+            tree_steps.push(Step::Keep { name: tree });
+            continue;
+        }
+        let is_free = |name: &PartHash| !cold && !used.contains(name) && !taken.contains(name);
+        let step = match candidate(residency, geometry.faces.hash(), triangles, is_free) {
+            None => Step::Build { tree, object, triangles },
+            Some(from) => {
+                let (choice, terms) = choose(&residency.trees[&from], triangles, *update, costs);
+                why.push(terms);
+                match choice {
+                    Choice::Rebuild => Step::Build { tree, object, triangles },
+                    Choice::Refit { keep_up_to } => {
+                        taken.insert(from);
+                        Step::Refit { from, tree, object, triangles, keep_up_to }
+                    }
+                }
+            }
+        };
+        let is_refit = matches!(step, Step::Refit { .. });
+        predicted_ms += triangles as f64 * if is_refit { costs.refit_ms } else { costs.build_ms };
+        tree_steps.push(step);
+    }
+
+    let unused = residency.held.keys().filter(|n| *cold || !used.contains(n) && !taken.contains(n));
+    let mut steps: Vec<Step> = unused.map(|&name| Step::Free { name }).collect();
     for (&part, &bytes) in &needed {
         steps.push(if is_held(&part) { Step::Keep { name: part } } else { Step::Upload { part, bytes } });
     }
-    for (&tree, &(object, triangles)) in &trees {
-        steps.push(if is_held(&tree) {
-            Step::Keep { name: tree }
-        } else {
-            Step::Build { tree, object, triangles }
-        });
-    }
+    steps.extend(tree_steps);
 
-    let kept = steps.iter().filter(|s| matches!(s, Step::Keep { .. })).count();
-    let built = steps.iter().filter(|s| matches!(s, Step::Build { .. })).count();
-    let (action, why) = if cold {
+    let count = |of: fn(&Step) -> bool| steps.iter().filter(|s| of(s)).count();
+    let kept = count(|s| matches!(s, Step::Keep { .. } | Step::Refit { .. }));
+    let built = count(|s| matches!(s, Step::Build { .. }));
+    let refitted = count(|s| matches!(s, Step::Refit { .. }));
+    let (action, what) = if *cold {
         (Action::Load, "everything is forgotten between frames (--cold)".to_string())
-    } else if kept == 0 {
+    } else if kept == 0 && why.is_empty() {
         (Action::Load, "nothing of it was resident".to_string())
-    } else if built == 0 {
-        (Action::None, format!("{} of {} trees resident", trees.len(), trees.len()))
+    } else if built > 0 {
+        (Action::Rebuild, format!("{built} of {} trees built", trees.len()))
+    } else if refitted > 0 {
+        (Action::Refit, format!("{refitted} of {} trees refitted", trees.len()))
     } else {
-        (Action::Rebuild, format!("{built} of {} trees changed", trees.len()))
+        (Action::None, format!("{} of {} trees resident", trees.len(), trees.len()))
     };
-    UpdatePlan { steps, action, why, part_bytes: needed.values().sum() }
+    why.insert(0, what);
+    UpdatePlan { steps, action, why: why.join("; "), part_bytes: needed.values().sum(), predicted_ms }
 }

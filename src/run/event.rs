@@ -2,7 +2,7 @@
 
 use crate::device::{RayCounts, UpdateCost};
 use crate::diff::Change;
-use crate::plan::UpdatePlan;
+use crate::plan::{Action, UpdatePlan};
 use crate::warning::Warning;
 use serde::Serialize;
 
@@ -116,12 +116,16 @@ impl FrameReport {
     /// Fills in what a plan and its execution tell.
     pub fn updated(&mut self, plan: &UpdatePlan, cost: &UpdateCost) {
         self.warm = plan.is_warm();
+        let refit_was_bad = plan.action == Action::Refit && cost.built.triangles > 0;
         self.update = UpdateReport {
-            action: Some(plan.action.word()),
-            cost_ratio: None,
-            predicted_ms: None,
+            action: Some(if refit_was_bad { Action::Rebuild } else { plan.action }.word()),
+            cost_ratio: cost.cost_ratio.filter(|ratio| ratio.is_finite()),
+            predicted_ms: Some(plan.predicted_ms),
             why: plan.why.clone(),
         };
+        if refit_was_bad {
+            self.update.why += "; the refitted tree was too bad to be kept";
+        }
         self.bytes.uploaded = Some(cost.uploaded_bytes);
         self.ms.upload = cost.upload_ms;
         self.ms.update = cost.update_ms;

@@ -2,6 +2,7 @@
 //! encoding n overlap; memory is bounded by the queues' lengths. An error is a value that travels with its frame.
 
 mod check;
+mod costs;
 pub mod event;
 pub mod machine;
 mod memory;
@@ -22,6 +23,7 @@ use crate::device::{Device, Stop};
 use crate::film::Film;
 use crate::job::Job;
 use crate::output::{self, OutputError, Records, RunLog};
+use crate::plan::Update;
 use crate::warning::Warnings;
 use memory::InFlight;
 use read::ReadFrame;
@@ -45,6 +47,8 @@ pub struct RunOptions {
     pub memory_bytes: Option<u64>,
     /// Forget everything between frames.
     pub cold: bool,
+    /// What is done with trees over meshes that changed.
+    pub update: Update,
     /// Render finished frames anew and write over files that no record names.
     pub overwrite: bool,
     /// Drop faces that cannot be rendered instead of failing their frame.
@@ -97,8 +101,10 @@ enum Note {
 
 /// A traced frame on its way to its file.
 struct Shown {
-    film: Film,
+    film: Arc<Film>,
     read: ReadFrame,
+    /// Rendered, or copied.
+    status: Status,
 }
 
 /// Renders a job on a device. `on_event` is called on this thread.
@@ -146,7 +152,17 @@ pub fn render(
         {
             let (note, flight, device) = (note.clone(), &flight, &mut device);
             scope.spawn(move || {
-                trace::device_stage(&mut **device, options, &from_readers, flight, stop, &to_writers, &note);
+                let frames = job.pictures.len();
+                trace::device_stage(
+                    &mut **device,
+                    options,
+                    frames,
+                    &from_readers,
+                    flight,
+                    stop,
+                    &to_writers,
+                    &note,
+                );
             });
         }
         for _ in 0..threads {

@@ -1,6 +1,7 @@
 //! The device stage: what changed, what the device must do, trace.
 
-use super::event::Status;
+use super::costs::Learned;
+use super::event::{Status, UpdateReport};
 use super::memory::InFlight;
 use super::read::{Read, ReadFrame};
 use super::report::DeviceReport;
@@ -9,17 +10,19 @@ use crate::clock::Stopwatch;
 use crate::device::{Device, DeviceError, Stop};
 use crate::diff::changes;
 use crate::film::Film;
-use crate::plan::plan_frame;
-use crate::scene::Frame;
+use crate::plan::{Action, Update, Wishes, plan_frame};
+use crate::scene::{Frame, PartHash};
 use std::collections::BTreeMap;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, Sender, SyncSender};
 
 /// Takes frames in their order, makes each resident, traces it and hands the film to a writer.
+#[allow(clippy::too_many_arguments, reason = "the stage's ends")]
 pub(super) fn device_stage(
     device: &mut dyn Device,
     options: &RunOptions,
+    frames: usize,
     from_readers: &Receiver<Read>,
     flight: &InFlight,
     stop: &Stop,
@@ -31,6 +34,9 @@ pub(super) fn device_stage(
         device,
         before: None,
         cold: options.cold,
+        update: options.update,
+        learned: Learned::new(),
+        frames_left: frames as u64,
         forget: false,
     };
     let mut waiting = BTreeMap::new();
@@ -39,6 +45,7 @@ pub(super) fn device_stage(
         waiting.insert(read.index, read);
         while let Some(Read { bytes, outcome, .. }) = waiting.remove(&turn) {
             turn += 1;
+            stage.frames_left = (frames - turn.min(frames)) as u64;
             flight.give_slot();
             let traced = match outcome {
                 _ if stop.asked() => None,
@@ -51,9 +58,9 @@ pub(super) fn device_stage(
             flight.give_bytes(bytes);
             let Some((film, mut read)) = traced else { continue };
             match film {
-                Ok(film) => {
+                Ok((film, status)) => {
                     // the writers outlive this stage
-                    let _ = to_writers.send(Shown { film, read });
+                    let _ = to_writers.send(Shown { film, read, status });
                 }
                 Err(None) => {}
                 Err(Some(error)) => {
@@ -70,55 +77,77 @@ pub(super) fn device_stage(
 struct DeviceStage<'a> {
     device: &'a mut dyn Device,
     told: DeviceReport,
-    /// The frame that the device traced last.
-    before: Option<Arc<Frame>>,
+    /// What the device traced last.
+    before: Option<Before>,
     cold: bool,
+    update: Update,
+    learned: Learned,
+    /// Frames that are still to come.
+    frames_left: u64,
     /// Whether what the device holds is not to be trusted, because it panicked.
     forget: bool,
 }
 
+/// A frame and what came of it.
+struct Before {
+    frame: Arc<Frame>,
+    fingerprint: PartHash,
+    film: Arc<Film>,
+}
+
 impl DeviceStage<'_> {
     /// The film, or why there is none; no reason means that the run was stopped.
-    fn frame(&mut self, read: &mut ReadFrame, stop: &Stop) -> Result<Film, Option<String>> {
+    fn frame(&mut self, read: &mut ReadFrame, stop: &Stop) -> Result<(Arc<Film>, Status), Option<String>> {
+        let is_copy = |before: &&Before| before.fingerprint == read.fingerprint;
+        if let Some(before) = self.before.as_ref().filter(|_| !self.cold).filter(is_copy) {
+            let report = &mut read.report;
+            report.warm = true;
+            report.change = changes(Some(&before.frame), &read.frame);
+            let why = "equal to the frame before, as are its settings".to_string();
+            report.update =
+                UpdateReport { action: Some(Action::None.word()), why, ..UpdateReport::default() };
+            return Ok((Arc::clone(&before.film), Status::Copied));
+        }
         let busy = Stopwatch::start();
         read.report.device = Some(self.told.name.clone());
         let traced = catch_unwind(AssertUnwindSafe(|| self.update_and_trace(read, stop)));
         let source = &read.report.source;
         self.told.busy_s += busy.s();
         self.told.holds(self.device);
-        match traced {
+        let failed = match traced {
             Ok(Ok(film)) => {
                 self.told.frames += 1;
-                self.before = Some(Arc::clone(&read.frame));
+                let film = Arc::new(film);
+                let (frame, fingerprint) = (Arc::clone(&read.frame), read.fingerprint);
+                self.before = Some(Before { frame, fingerprint, film: Arc::clone(&film) });
                 self.forget = false;
-                Ok(film)
+                return Ok((film, Status::Rendered));
             }
-            Ok(Err(DeviceError::Stopped)) => Err(None),
+            Ok(Err(DeviceError::Stopped)) => return Err(None),
             Ok(Err(error)) => {
-                self.before = None;
-                self.forget = true;
-                let told = format!("{source}: {error}");
                 read.report.device_failed = true;
-                Err(Some(told))
+                format!("{source}: {error}")
             }
-            Err(panic) => {
-                self.before = None;
-                self.forget = true;
-                Err(Some(format!("{source}: {}", panic_text("tracing", &*panic))))
-            }
-        }
+            Err(panic) => format!("{source}: {}", panic_text("tracing", &*panic)),
+        };
+        self.before = None;
+        self.forget = true;
+        Err(Some(failed))
     }
 
     fn update_and_trace(&mut self, read: &mut ReadFrame, stop: &Stop) -> Result<Film, DeviceError> {
         let report = &mut read.report;
         let clock = Stopwatch::start();
         let cold = self.cold || self.forget;
-        report.change = changes(self.before.as_deref().filter(|_| !cold), &read.frame);
+        let before = self.before.as_ref().filter(|_| !cold).map(|before| &*before.frame);
+        report.change = changes(before, &read.frame);
         report.ms.diff = Some(clock.ms());
-        let plan = plan_frame(&read.frame, self.device.residency(), cold);
+        let wishes = Wishes { cold, update: self.update, costs: self.learned.costs(self.frames_left) };
+        let plan = plan_frame(&read.frame, self.device.residency(), &wishes);
         let cost = self.device.apply(&plan, &read.frame)?;
         report.updated(&plan, &cost);
         let traced = self.device.trace(&read.frame, &read.shot, stop)?;
+        self.learned.frame(&cost, traced.trace_ms);
         report.rays = traced.rays.into();
         report.ms.trace = Some(traced.trace_ms);
         report.ms.readback = traced.readback_ms;

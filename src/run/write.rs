@@ -19,7 +19,7 @@ pub(super) fn write_stage(log: &RunLog, films: &Mutex<Receiver<Shown>>, note: &S
             Ok(Err(error)) => Some(error.to_string()),
             Err(panic) => Some(format!("{}: {}", shown.read.report.picture, panic_text("writing", &*panic))),
         };
-        shown.read.report.status = if error.is_some() { Status::Failed } else { Status::Rendered };
+        shown.read.report.status = if error.is_some() { Status::Failed } else { shown.status };
         shown.read.report.error = error;
         let _ = note.send(Note::Frame(shown.read.report));
     }

@@ -3,7 +3,7 @@
 use crate::accel::{Quality, TracedObject, TracedScene, Tree};
 use crate::clock::Stopwatch;
 use crate::device::{DeviceError, DeviceInfo, UpdateCost};
-use crate::plan::{Residency, Step, UpdatePlan, tree_name};
+use crate::plan::{Residency, Step, TreeState, UpdatePlan, tree_name};
 use crate::scene::{Frame, Geometry, PartHash};
 use rayon::ThreadPool;
 use std::collections::HashMap;
@@ -38,8 +38,7 @@ impl Resident {
         let needed_bytes = plan.needed_bytes(&self.residency, TREE_BYTES_PER_TRIANGLE);
         refuse_beyond(device, needed_bytes)?;
         self.parts = frame.objects.iter().map(|o| Arc::clone(&o.geometry)).collect();
-        let mut uploaded_bytes = 0;
-        let mut update_ms = 0.0;
+        let mut cost = UpdateCost::default();
         let start = Stopwatch::start();
         for step in &plan.steps {
             match *step {
@@ -49,25 +48,69 @@ impl Resident {
                 }
                 Step::Keep { .. } => self.residency.keep(),
                 Step::Upload { part, bytes } => {
-                    uploaded_bytes += bytes;
+                    cost.uploaded_bytes += bytes;
                     self.residency.hold(part, bytes);
+                }
+                Step::Refit { from, tree: name, object, keep_up_to, .. } => {
+                    let Some(object) = frame.objects.get(object) else { continue };
+                    let geometry = &object.geometry;
+                    let refitted = Stopwatch::start();
+                    let tree = self.trees.remove(&from);
+                    let is_good = tree.is_some_and(|mut tree| {
+                        // no trace is under way, so that nobody else holds it and nothing is copied
+                        let in_place = Arc::make_mut(&mut tree);
+                        pool.install(|| in_place.refit(&geometry.positions.0, &geometry.triangles.0));
+                        self.residency.refit(from, name, in_place.cost());
+                        self.trees.insert(name, tree);
+                        self.residency.trees.get(&name).is_some_and(|s| s.ratio() <= keep_up_to)
+                    });
+                    let triangles = geometry.triangles.0.len() as u64;
+                    cost.refitted.add(triangles, refitted.ms());
+                    if !is_good {
+                        self.trees.remove(&name);
+                        self.residency.free(name);
+                        self.build(name, geometry, pool, device, &mut cost)?;
+                    }
                 }
                 Step::Build { tree: name, object, .. } => {
                     let Some(object) = frame.objects.get(object) else { continue };
-                    let start = Stopwatch::start();
-                    let geometry = &object.geometry;
-                    let tree = pool.install(|| {
-                        Tree::build(&geometry.positions.0, &geometry.triangles.0, Quality::default())
-                    });
-                    // many small objects may need more than the estimate
-                    refuse_beyond(device, self.residency.bytes() + tree.bytes())?;
-                    self.residency.hold(name, tree.bytes());
-                    self.trees.insert(name, Arc::new(tree));
-                    update_ms += start.ms();
+                    self.build(name, &object.geometry, pool, device, &mut cost)?;
                 }
             }
         }
-        Ok(UpdateCost { uploaded_bytes, upload_ms: Some(start.ms() - update_ms), update_ms: Some(update_ms) })
+        let update_ms = cost.built.ms + cost.refitted.ms;
+        cost.upload_ms = Some(start.ms() - update_ms);
+        cost.update_ms = Some(update_ms);
+        cost.cost_ratio = self.cost_ratio();
+        Ok(cost)
+    }
+
+    fn build(
+        &mut self,
+        name: PartHash,
+        geometry: &Geometry,
+        pool: &ThreadPool,
+        device: &DeviceInfo,
+        cost: &mut UpdateCost,
+    ) -> Result<(), DeviceError> {
+        let start = Stopwatch::start();
+        let tree =
+            pool.install(|| Tree::build(&geometry.positions.0, &geometry.triangles.0, Quality::default()));
+        // many small objects may need more than the estimate
+        refuse_beyond(device, self.residency.bytes() + tree.bytes())?;
+        let state = TreeState::built(geometry, tree.cost());
+        self.residency.hold_tree(name, tree.bytes(), state);
+        self.trees.insert(name, Arc::new(tree));
+        cost.built.add(geometry.triangles.0.len() as u64, start.ms());
+        Ok(())
+    }
+
+    /// Mean over the trees by triangles.
+    fn cost_ratio(&self) -> Option<f64> {
+        let trees = || self.residency.trees.values();
+        let triangles: u64 = trees().map(|s| s.triangles).sum();
+        let sum: f64 = trees().map(|s| s.triangles as f64 * s.ratio()).sum();
+        (triangles > 0).then(|| sum / triangles as f64)
     }
 
     /// The scene of a frame that is resident; else the first object whose tree is not there.
