@@ -10,6 +10,7 @@ mod render_args;
 mod request;
 mod size;
 mod stop;
+mod verify;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use std::process::ExitCode;
@@ -72,6 +73,11 @@ enum Command {
         after_help = "Examples:\n  rentix render walk/\n  rentix render 'walk/walk_####.obj' --frames 1-100x2 --size 1920x1080 --samples 16 -o out\n  rentix render job.yaml"
     )]
     Render(Box<render_args::RenderArgs>),
+    /// Renders warm and cold and in several orders, and compares byte for byte
+    #[command(
+        after_help = "Example: rentix verify walk/ --size 160x90 --update refit\n\nExit status: 0 equal, 1 they differ; the first frame and pixel that differ are named."
+    )]
+    Verify(Box<render_args::RenderArgs>),
     /// Tells what is in a sequence and what changes from frame to frame; renders nothing
     #[command(after_help = "Example: rentix inspect walk/")]
     Inspect(Box<render_args::RenderArgs>),
@@ -105,6 +111,7 @@ pub fn main() -> ExitCode {
     };
     let ended = match &cli.command {
         Command::Render(args) => render::render(args, &cli.global),
+        Command::Verify(args) => verify::verify(args, &cli.global),
         Command::Inspect(args) => inspect::inspect(args, &cli.global),
         Command::Compare(args) => compare::compare(args, &cli.global),
         Command::Devices => devices::devices(&cli.global),

@@ -24,17 +24,7 @@ pub(super) fn render(args: &RenderArgs, global: &Global) -> Result<ExitCode> {
     let kind = if json || global.quiet && for_people { ProgressKind::None } else { args.progress };
     let mut progress = Progress::new(kind, global.verbose);
     let stop = stop::on_signals()?;
-    let options = RunOptions {
-        threads: threads(args),
-        memory_bytes: Some(args.memory.unwrap_or_else(machine::default_budget_bytes)),
-        cold: args.cold,
-        update: args.update.into(),
-        overwrite: args.overwrite,
-        lenient: args.lenient,
-        strict: args.strict,
-        report: args.report.clone(),
-    };
-    let outcome = run::render(&job, &options, device, &stop.asked, &mut |event| {
+    let outcome = run::render(&job, &run_options(args), device, &stop.asked, &mut |event| {
         if json {
             println!("{}", event_json(event));
         } else if !(global.quiet && matches!(event, Event::Warning(_))) {
@@ -48,8 +38,22 @@ pub(super) fn render(args: &RenderArgs, global: &Global) -> Result<ExitCode> {
     Ok(conclude(&job, &outcome, global, &stop))
 }
 
+/// What of the options bears on the run itself.
+pub(super) fn run_options(args: &RenderArgs) -> RunOptions {
+    RunOptions {
+        threads: threads(args),
+        memory_bytes: Some(args.memory.unwrap_or_else(machine::default_budget_bytes)),
+        cold: args.cold,
+        update: args.update.into(),
+        overwrite: args.overwrite,
+        lenient: args.lenient,
+        strict: args.strict,
+        report: args.report.clone(),
+    }
+}
+
 /// The device asked for.
-fn device(args: &RenderArgs) -> Result<Box<dyn Device>> {
+pub(super) fn device(args: &RenderArgs) -> Result<Box<dyn Device>> {
     match args.device.as_deref() {
         None | Some("cpu" | "all") => {
             let budget = args.device_memory.unwrap_or_else(machine::default_budget_bytes);

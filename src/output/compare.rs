@@ -63,7 +63,7 @@ fn compare_folders(a: &Path, b: &Path) -> Result<Vec<PictureComparison>, OutputE
 }
 
 /// Paths of all pictures below a folder, relative to it.
-fn pictures_below(folder: &Path) -> Result<BTreeSet<PathBuf>, OutputError> {
+pub(super) fn pictures_below(folder: &Path) -> Result<BTreeSet<PathBuf>, OutputError> {
     let mut pictures = BTreeSet::new();
     let mut subfolders = vec![PathBuf::new()];
     while let Some(subfolder) = subfolders.pop() {

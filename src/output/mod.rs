@@ -5,6 +5,7 @@
 
 mod atomic;
 mod compare;
+mod difference;
 mod encoding;
 mod error;
 mod exr;
@@ -24,6 +25,7 @@ mod tiff;
 
 pub use atomic::write_atomic;
 pub use compare::{PictureComparison, PictureOutcome, compare_paths};
+pub use difference::first_difference;
 pub use encoding::{Bits, Encoding, Format, PictureFile, file_names, picture_files};
 pub use error::OutputError;
 pub use finish::{clean_up, finish, foreign};

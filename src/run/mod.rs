@@ -11,6 +11,7 @@ mod read;
 mod report;
 mod source;
 mod trace;
+pub mod verify;
 mod write;
 
 pub use event::{Event, FrameReport, Status};
@@ -71,6 +72,9 @@ pub enum RunError {
     /// The output folder cannot be used.
     #[error(transparent)]
     Output(#[from] OutputError),
+    /// There is no place for temporary pictures.
+    #[error("no temporary folder can be made: {0}; TMPDIR names another place")]
+    NoRoom(std::io::Error),
     /// The report cannot be written; the pictures are there.
     #[error("the report cannot be written: {0}")]
     Report(OutputError),
