@@ -31,6 +31,14 @@ impl Stopwatch {
 /// When a file was changed, as the system tells it.
 pub type FileTime = SystemTime;
 
+/// Now, to stamp files with.
+pub fn file_time() -> FileTime {
+    SystemTime::now()
+}
+
+/// Before every file.
+pub const EARLIEST: FileTime = SystemTime::UNIX_EPOCH;
+
 /// Nanoseconds since the Unix epoch; 0 where the system's clock stands before it.
 pub fn unix_ns() -> u128 {
     SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).map_or(0, |d| d.as_nanos())

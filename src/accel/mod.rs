@@ -21,6 +21,7 @@ mod packet;
 mod placement;
 mod slab;
 mod stack;
+mod stored;
 mod traced;
 mod traverse;
 mod tree;

@@ -1,5 +1,6 @@
 //! What was typed, what it means, a call below; the only room that prints.
 
+mod cache;
 mod compare;
 mod completions;
 mod devices;
@@ -10,6 +11,7 @@ mod render_args;
 mod request;
 mod size;
 mod stop;
+mod store;
 mod verify;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
@@ -86,6 +88,9 @@ enum Command {
         after_help = "Example: rentix compare out/a out/b --flip 0.005\n\nExit status: 0 equal (or within --flip), 1 they differ, 2 unreadable."
     )]
     Compare(compare::CompareArgs),
+    /// Tells what is in the store on disk, or removes of it
+    #[command(after_help = "Example: rentix cache stat")]
+    Cache(cache::CacheArgs),
     /// Lists what can render
     #[command(after_help = "Example: rentix devices --json")]
     Devices,
@@ -114,6 +119,7 @@ pub fn main() -> ExitCode {
         Command::Verify(args) => verify::verify(args, &cli.global),
         Command::Inspect(args) => inspect::inspect(args, &cli.global),
         Command::Compare(args) => compare::compare(args, &cli.global),
+        Command::Cache(args) => cache::cache(args, &cli.global),
         Command::Devices => devices::devices(&cli.global),
         Command::Completions { shell } => Ok(completions::completions(*shell)),
     };

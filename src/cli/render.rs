@@ -2,19 +2,23 @@
 
 use super::progress::{Progress, ProgressKind};
 use super::render_args::RenderArgs;
+use super::store::store;
 use super::{EXIT_FAILED, EXIT_NO_DEVICE, Global, request, stop};
 use crate::device::Device;
 use crate::device::cpu::CpuDevice;
 use crate::job::{self, FrameSet, Job};
 use crate::run::{self, Event, FrameReport, Outcome, RunOptions, machine};
+use crate::store::Store;
 use anyhow::{Result, bail};
 use std::fmt::Write as _;
 use std::process::ExitCode;
+use std::sync::Arc;
 
 /// Renders what was asked for and tells how it went.
 pub(super) fn render(args: &RenderArgs, global: &Global) -> Result<ExitCode> {
     let job = job::resolve(&request::request(args)?)?;
-    let device = device(args)?;
+    let options = run_options(args);
+    let device = device(args, &options)?;
     if args.dry_run {
         dry_run(&job, global);
         return Ok(ExitCode::SUCCESS);
@@ -24,7 +28,7 @@ pub(super) fn render(args: &RenderArgs, global: &Global) -> Result<ExitCode> {
     let kind = if json || global.quiet && for_people { ProgressKind::None } else { args.progress };
     let mut progress = Progress::new(kind, global.verbose);
     let stop = stop::on_signals()?;
-    let outcome = run::render(&job, &run_options(args), device, &stop.asked, &mut |event| {
+    let outcome = run::render(&job, &options, device, &stop.asked, &mut |event| {
         if json {
             println!("{}", event_json(event));
         } else if !(global.quiet && matches!(event, Event::Warning(_))) {
@@ -49,15 +53,21 @@ pub(super) fn run_options(args: &RenderArgs) -> RunOptions {
         lenient: args.lenient,
         strict: args.strict,
         report: args.report.clone(),
+        store: store_of(args),
     }
 }
 
+/// The store asked for; a run that forgets everything between frames has none.
+fn store_of(args: &RenderArgs) -> Option<Arc<Store>> {
+    if args.no_cache || args.cold { None } else { store(args.cache.as_deref()) }
+}
+
 /// The device asked for.
-pub(super) fn device(args: &RenderArgs) -> Result<Box<dyn Device>> {
+pub(super) fn device(args: &RenderArgs, options: &RunOptions) -> Result<Box<dyn Device>> {
     match args.device.as_deref() {
         None | Some("cpu" | "all") => {
             let budget = args.device_memory.unwrap_or_else(machine::default_budget_bytes);
-            Ok(Box::new(CpuDevice::new(threads(args), budget)?))
+            Ok(Box::new(CpuDevice::new(threads(args), budget)?.with_store(options.store.clone())))
         }
         Some(other) => bail!("there is no device {other}; `rentix devices` lists those there are"),
     }

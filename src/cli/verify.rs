@@ -15,11 +15,12 @@ pub(super) fn verify(args: &RenderArgs, global: &Global) -> Result<ExitCode> {
     let mut job = job::resolve(&request::request(args)?)?;
     // the order is what is tried
     job.pictures.sort_by_key(|p| (p.sequence, p.frame));
+    let options = run_options(args);
     let stop = stop::on_signals()?;
     let kind = if global.quiet || global.json { ProgressKind::None } else { args.progress };
     let mut progress = Progress::new(kind, global.verbose);
     let (verdict, outcome) =
-        verify_job(&job, &run_options(args), || device(args), &stop.asked, &mut |way, event| {
+        verify_job(&job, &options, || device(args, &options), &stop.asked, &mut |way, event| {
             if !(global.quiet || global.json) {
                 if matches!(event, Event::Start { .. }) {
                     progress.line(&format!("{}:", way.name));

@@ -25,6 +25,7 @@ use crate::film::Film;
 use crate::job::Job;
 use crate::output::{self, OutputError, Records, RunLog};
 use crate::plan::Update;
+use crate::store::Store;
 use crate::warning::Warnings;
 use memory::InFlight;
 use read::ReadFrame;
@@ -58,6 +59,15 @@ pub struct RunOptions {
     pub strict: bool,
     /// Where the report goes.
     pub report: Option<PathBuf>,
+    /// What is kept on disk from run to run; None: nothing.
+    pub store: Option<Arc<Store>>,
+}
+
+impl RunOptions {
+    /// The store; a run that forgets everything between frames has none.
+    fn store_of_run(&self) -> Option<Arc<Store>> {
+        self.store.clone().filter(|_| !self.cold)
+    }
 }
 
 /// Why a run could not begin (exit status 2).
@@ -190,6 +200,12 @@ pub fn render(
         }
     });
 
+    if let Some(store) = options.store_of_run() {
+        store.collect_garbage();
+        let mut notes = Warnings::default();
+        store.take_notes().into_iter().for_each(|note| notes.add(None, None, note));
+        tell(&notes, &mut warnings, &mut report, on_event);
+    }
     if !stop.asked() {
         for gone in check::pictures_gone(job, &mut report) {
             on_event(&Event::Frame(Box::new(gone)));

@@ -2,6 +2,7 @@
 
 use crate::clock::FileTime;
 use crate::format::{self, FormatError, Loaded, ReadOptions, TextureCache};
+use crate::store::Store;
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -31,9 +32,9 @@ pub struct Sources {
 }
 
 impl Sources {
-    /// With a limit on the bytes that one frame's textures may take together.
-    pub(super) fn with_limit(texture_bytes: Option<u64>) -> Self {
-        Self { textures: TextureCache::with_limit(texture_bytes), ..Self::default() }
+    /// With a limit on the bytes that one frame's textures may take together, and a store.
+    pub(super) fn new(texture_bytes: Option<u64>, store: Option<Arc<Store>>) -> Self {
+        Self { textures: TextureCache::new(texture_bytes, store), ..Self::default() }
     }
 
     /// Loads an OBJ before its picture's turn and keeps it until then.

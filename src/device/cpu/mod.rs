@@ -7,8 +7,10 @@ use super::{Device, DeviceError, DeviceInfo, DeviceKind, Stop, Traced, UpdateCos
 use crate::accel::Width;
 use crate::plan::{Residency, UpdatePlan};
 use crate::scene::{Frame, Shot};
+use crate::store::Store;
 use rayon::{ThreadPool, ThreadPoolBuildError, ThreadPoolBuilder};
 use resident::Resident;
+use std::sync::Arc;
 
 /// The CPU device.
 #[derive(Debug)]
@@ -37,6 +39,13 @@ impl CpuDevice {
             budget_bytes,
         };
         Ok(Self { info, pool, resident: Resident::default(), width })
+    }
+
+    /// Takes the shapes of a run's first trees from a store, and puts them into it.
+    #[must_use]
+    pub fn with_store(mut self, store: Option<Arc<Store>>) -> Self {
+        self.resident.store = store;
+        self
     }
 
     /// Traces in another SIMD width; one that the machine lacks is not taken. The pictures are the same.

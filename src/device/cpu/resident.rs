@@ -3,8 +3,9 @@
 use crate::accel::{Quality, TracedObject, TracedScene, Tree};
 use crate::clock::Stopwatch;
 use crate::device::{DeviceError, DeviceInfo, UpdateCost};
-use crate::plan::{Residency, Step, TreeState, UpdatePlan, tree_name};
+use crate::plan::{Action, Residency, Step, TreeState, UpdatePlan, tree_name};
 use crate::scene::{Frame, Geometry, PartHash};
+use crate::store::{Key, Store};
 use rayon::ThreadPool;
 use std::collections::HashMap;
 use std::sync::Arc;
@@ -19,6 +20,8 @@ pub(super) struct Resident {
     trees: HashMap<PartHash, Arc<Tree>>,
     /// Keeps the parts in memory.
     parts: Vec<Arc<Geometry>>,
+    /// Has shapes of trees.
+    pub(super) store: Option<Arc<Store>>,
 }
 
 impl Resident {
@@ -69,12 +72,14 @@ impl Resident {
                     if !is_good {
                         self.trees.remove(&name);
                         self.residency.free(name);
-                        self.build(name, geometry, pool, device, &mut cost)?;
+                        self.build(name, geometry, None, pool, device, &mut cost)?;
                     }
                 }
                 Step::Build { tree: name, object, .. } => {
                     let Some(object) = frame.objects.get(object) else { continue };
-                    self.build(name, &object.geometry, pool, device, &mut cost)?;
+                    // those of later frames come in any number, and are hardly asked for again
+                    let store = self.store.clone().filter(|_| plan.action == Action::Load);
+                    self.build(name, &object.geometry, store.as_deref(), pool, device, &mut cost)?;
                 }
             }
         }
@@ -89,13 +94,13 @@ impl Resident {
         &mut self,
         name: PartHash,
         geometry: &Geometry,
+        store: Option<&Store>,
         pool: &ThreadPool,
         device: &DeviceInfo,
         cost: &mut UpdateCost,
     ) -> Result<(), DeviceError> {
         let start = Stopwatch::start();
-        let tree =
-            pool.install(|| Tree::build(&geometry.positions.0, &geometry.triangles.0, Quality::default()));
+        let tree = pool.install(|| stored_or_built(name, geometry, store));
         // many small objects may need more than the estimate
         refuse_beyond(device, self.residency.bytes() + tree.bytes())?;
         let state = TreeState::built(geometry, tree.cost());
@@ -121,6 +126,24 @@ impl Resident {
         });
         Ok(TracedScene::new(objects.collect::<Result<_, usize>>()?))
     }
+}
+
+/// Below so many triangles a tree is built faster than its shape is read.
+const LEAST_STORED: usize = 2048;
+/// Another name for each way in which trees are built or kept.
+const STORED: &str = "tree-1";
+
+fn stored_or_built(name: PartHash, geometry: &Geometry, store: Option<&Store>) -> Tree {
+    let (positions, triangles) = (&geometry.positions.0, &geometry.triangles.0);
+    let build = || Tree::build(positions, triangles, Quality::default());
+    let Some(store) = store.filter(|_| triangles.len() >= LEAST_STORED) else { return build() };
+    let stored = store.get(STORED, Key(name.0));
+    if let Some(tree) = stored.and_then(|bytes| Tree::from_shape(&bytes, positions, triangles)) {
+        return tree;
+    }
+    let tree = build();
+    store.put(STORED, Key(name.0), &[&tree.shape_bytes()]);
+    tree
 }
 
 fn refuse_beyond(device: &DeviceInfo, needed_bytes: u64) -> Result<(), DeviceError> {

@@ -2,18 +2,20 @@
 
 mod decode;
 mod mip;
+mod stored;
 
 use super::error::FormatError;
 use super::text;
 use crate::clock::FileTime;
 use crate::scene::{Part, TexelSpace, Texels, Texture};
+use crate::store::Store;
 use decode::{Picture, Room};
 use rayon::prelude::*;
 use std::collections::{HashMap, HashSet};
 use std::fs;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Arc, Mutex, PoisonError};
 
 /// Textures that none of so many loads has used are given up: more than the frames that are read ahead.
 const KEPT_LOADS: u64 = 16;
@@ -36,6 +38,7 @@ pub(super) enum TextureUse {
 pub struct TextureCache {
     held: Mutex<Held>,
     limit_bytes: Option<u64>,
+    store: Option<Arc<Store>>,
 }
 
 #[derive(Debug, Default)]
@@ -68,9 +71,9 @@ pub(super) struct LoadedTexture {
 }
 
 impl TextureCache {
-    /// One that refuses textures of one load that take more than so many bytes together, mip levels included.
-    pub fn with_limit(limit_bytes: Option<u64>) -> Self {
-        Self { limit_bytes, ..Self::default() }
+    /// One that refuses textures of one load that take more than so many bytes together, mip levels included. Textures that a store holds are taken from it, others put into it.
+    pub fn new(limit_bytes: Option<u64>, store: Option<Arc<Store>>) -> Self {
+        Self { limit_bytes, store, ..Self::default() }
     }
 
     /// The textures in those files, each decoded where it is not held. `obj` is what they are loaded for.
@@ -95,8 +98,11 @@ impl TextureCache {
         for entry in present.into_iter().filter_map(|key| held.textures.get(key)) {
             room.take(entry.texture.as_ref().map_or(0, Part::bytes));
         }
-        let mut decoded: HashMap<&Key, _> =
-            absent.into_par_iter().map(|key| (key, decoded(&key.path, key.texture_use, &room))).collect();
+        let store = self.store.as_deref();
+        let mut decoded: HashMap<&Key, _> = absent
+            .into_par_iter()
+            .map(|key| (key, decoded(&key.path, key.texture_use, &room, store)))
+            .collect();
         if let Some(needed_bytes) = room.exceeded() {
             return Err(FormatError::TexturesTooLarge { path: obj.to_path_buf(), needed_bytes, limit_bytes });
         }
@@ -140,17 +146,34 @@ fn key(path: &Path, texture_use: TextureUse) -> Result<Key, FormatError> {
 
 /// Reads a picture of colours, for the background: 8-bit ones are sRGB.
 pub fn load_picture(path: &Path) -> Result<Part<Texture>, FormatError> {
-    decoded(path, TextureUse::Color, &Room::new(u64::MAX))
+    decoded(path, TextureUse::Color, &Room::new(u64::MAX), None)
 }
 
-/// Reads and decodes a file.
-fn decoded(path: &Path, texture_use: TextureUse, room: &Room) -> Result<Part<Texture>, FormatError> {
+/// Reads and decodes a file, or takes from the store what becomes of it.
+fn decoded(
+    path: &Path,
+    texture_use: TextureUse,
+    room: &Room,
+    store: Option<&Store>,
+) -> Result<Part<Texture>, FormatError> {
     let bytes = text::read(path)?;
+    let stored = store.map(|store| (store, stored::key(&bytes, texture_use)));
+    if let Some(texture) = stored.and_then(|(store, key)| stored::get(store, key)) {
+        let part = Part::new(texture);
+        room.take(part.bytes());
+        return Ok(part);
+    }
     // decoders are other people's code: what they do on broken files must not end the run
     let picture = catch_unwind(AssertUnwindSafe(|| decode::decode(&bytes, path, room)))
         .unwrap_or_else(|_| Err("is broken, its decoder gave up on it".to_owned()));
     picture
-        .map(|picture| Part::new(texture(picture, texture_use)))
+        .map(|picture| {
+            let texture = texture(picture, texture_use);
+            if let Some((store, key)) = stored {
+                stored::put(store, key, &texture);
+            }
+            Part::new(texture)
+        })
         .map_err(|cause| FormatError::BadPicture { path: path.to_path_buf(), cause })
 }
 

@@ -1,0 +1,104 @@
+//! Decoded textures with their levels in the store: size, what the numbers are, texels.
+
+use super::TextureUse;
+use crate::scene::{PartHasher, TexelSpace, Texels, Texture};
+use crate::store::{Key, Store};
+
+/// Another name for each form in which textures are kept, or in which they are decoded.
+const KIND: &str = "texture-1";
+const HEAD_BYTES: usize = 12;
+
+/// Bytes of a texel.
+const U8_BYTES: usize = 4;
+const F32_BYTES: usize = 16;
+
+/// The name of what becomes of a picture file.
+pub(super) fn key(file: &[u8], texture_use: TextureUse) -> Key {
+    let mut h = PartHasher::new(KIND);
+    h.u64(u64::from(texture_use == TextureUse::Color));
+    h.bytes(file);
+    Key(h.finish().0)
+}
+
+pub(super) fn put(store: &Store, key: Key, texture: &Texture) {
+    let flags = |a: bool, b: bool, c: bool| u32::from(a) | u32::from(b) << 1 | u32::from(c) << 2;
+    let is_float = matches!(texture.texels, Texels::F32(_));
+    let head = [
+        texture.size[0],
+        texture.size[1],
+        flags(texture.space == TexelSpace::Srgb, texture.alpha_varies, is_float),
+    ];
+    let texels: &[u8] = match &texture.texels {
+        Texels::U8(t) => bytemuck::cast_slice(t),
+        Texels::F32(t) => bytemuck::cast_slice(t),
+    };
+    let head = head.map(u32::to_le_bytes);
+    store.put(KIND, key, &[head.as_flattened(), texels]);
+}
+
+/// The texture and the bytes of its texels; None where the store has none, or one of another form.
+pub(super) fn get(store: &Store, key: Key) -> Option<Texture> {
+    let bytes = store.get(KIND, key)?;
+    let (head, texels) = bytes.split_at_checked(HEAD_BYTES)?;
+    let [width, height, flags] =
+        [0, 4, 8].map(|at| u32::from_le_bytes([head[at], head[at + 1], head[at + 2], head[at + 3]]));
+    if width == 0 || height == 0 || flags > 7 {
+        return None;
+    }
+    let is_float = flags & 4 != 0;
+    let texture = Texture {
+        size: [width, height],
+        space: if flags & 1 != 0 { TexelSpace::Srgb } else { TexelSpace::Linear },
+        alpha_varies: flags & 2 != 0,
+        texels: if is_float {
+            Texels::F32(bytemuck::pod_collect_to_vec(texels.get(..texels.len() / F32_BYTES * F32_BYTES)?))
+        } else {
+            Texels::U8(bytemuck::pod_collect_to_vec(texels.get(..texels.len() / U8_BYTES * U8_BYTES)?))
+        },
+    };
+    let count: usize = (0..texture.levels())
+        .map(|level| texture.level_size(level).map(|s| s as usize))
+        .try_fold(0_usize, |sum, [w, h]| sum.checked_add(w.checked_mul(h)?))?;
+    let expected = count.checked_mul(if is_float { F32_BYTES } else { U8_BYTES })?;
+    (texels.len() == expected).then_some(texture)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn textures_come_back_as_they_were() {
+        let t = tempfile::tempdir().unwrap();
+        let store = Store::new(t.path(), 1 << 20);
+        let u8s = Texture {
+            size: [2, 1],
+            space: TexelSpace::Srgb,
+            alpha_varies: true,
+            texels: Texels::U8(vec![[1, 2, 3, 4], [5, 6, 7, 8], [9, 9, 9, 9]]),
+        };
+        let floats = Texture {
+            size: [1, 1],
+            space: TexelSpace::Linear,
+            alpha_varies: false,
+            texels: Texels::F32(vec![[0.5, -0.0, 1e30, 1.0]]),
+        };
+        for texture in [u8s, floats] {
+            for texture_use in [TextureUse::Color, TextureUse::Data] {
+                let key = key(b"file", texture_use);
+                put(&store, key, &texture);
+                assert_eq!(get(&store, key).unwrap(), texture);
+            }
+        }
+        // too few texels for its size
+        let short = Texture {
+            size: [4, 4],
+            space: TexelSpace::Linear,
+            alpha_varies: false,
+            texels: Texels::U8(vec![[0; 4]; 3]),
+        };
+        put(&store, Key(7), &short);
+        assert_eq!(get(&store, Key(7)), None);
+        assert!(key(b"a", TextureUse::Color) != key(b"a", TextureUse::Data));
+    }
+}
