@@ -57,10 +57,27 @@ impl Aabb {
         let [a, b, c] = corners;
         let min = per_axis(|k| Lanes::min(a[k], Lanes::min(b[k], c[k])));
         let max = per_axis(|k| Lanes::max(a[k], Lanes::max(b[k], c[k])));
-        let extent = Lanes::max(max[0] - min[0], Lanes::max(max[1] - min[1], max[2] - min[2]));
-        let margin = extent * (8.0 * f32::EPSILON);
-        Self { min: per_axis(|k| -next_up(margin - min[k])), max: per_axis(|k| next_up(max[k] + margin)) }
+        let margin = own_margin(per_axis(|k| max[k] - min[k]));
+        Self { min: per_axis(|k| below(min[k], margin)), max: per_axis(|k| above(max[k], margin)) }
     }
+}
+
+/// By how much a triangle's own box is larger than its corners'.
+#[inline(always)]
+pub(crate) fn own_margin(size: [f32; 3]) -> f32 {
+    Lanes::max(size[0], Lanes::max(size[1], size[2])) * (8.0 * f32::EPSILON)
+}
+
+/// The least side of an own box.
+#[inline(always)]
+pub(crate) fn below(min: f32, margin: f32) -> f32 {
+    -next_up(margin - min)
+}
+
+/// The greatest side of an own box.
+#[inline(always)]
+pub(crate) fn above(max: f32, margin: f32) -> f32 {
+    next_up(max + margin)
 }
 
 /// The next greater float; what is not finite stays. Like `f32::next_up`, but without branches.

@@ -121,6 +121,26 @@ pub fn has_area(corners: &[[f32; 3]; 3]) -> bool {
     n.iter().all(|x| x.is_finite()) && n != [0.0; 3]
 }
 
+/// [`has_area`] of eight triangles side by side, by corner, axis, lane.
+pub(crate) fn have_area(corners: &[[[f32; 8]; 3]; 3]) -> [bool; 8] {
+    let [a, b, c] = corners;
+    let mut sums = [0.0_f64; 8];
+    let mut are_finite = [true; 8];
+    for [x, y] in [[0, 1], [1, 2], [2, 0]] {
+        for lane in 0..8 {
+            let edge = |p: &[[f32; 8]; 3], k: usize| f64::from(p[k][lane]) - f64::from(a[k][lane]);
+            let n = edge(b, x) * edge(c, y) - edge(b, y) * edge(c, x);
+            are_finite[lane] &= n.is_finite();
+            sums[lane] += if n == 0.0 { 0.0 } else { 1.0 };
+        }
+    }
+    let mut has_area = [false; 8];
+    for lane in 0..8 {
+        has_area[lane] = are_finite[lane] && sums[lane] > 0.0;
+    }
+    has_area
+}
+
 /// What is looked for along a ray: the first candidate strictly between two places of the order.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Search {
