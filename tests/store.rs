@@ -1,0 +1,114 @@
+//! The store on disk bears on time alone: pictures are the same without it, with it, with it damaged, full or gone.
+
+mod common;
+use common::{pictures, render, run, wave};
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+/// A textured wave of more triangles than a tree is kept for.
+fn scene(folder: &Path) -> PathBuf {
+    let input = wave(&folder.join("w"), 2, 32, 40);
+    image::RgbImage::from_fn(64, 64, |x, y| image::Rgb([x as u8 * 4, y as u8 * 4, 99]))
+        .save(input.join("t.png"))
+        .unwrap();
+    std::fs::write(input.join("t.mtl"), "newmtl m\nmap_Kd t.png\n").unwrap();
+    for frame in 1..=2 {
+        let obj = input.join(format!("wave_{frame:04}.obj"));
+        let text = std::fs::read_to_string(&obj).unwrap();
+        let textured = "\nmtllib t.mtl\nusemtl m\nvt 0 0\nvt 1 0\nvt 0 1\nf 1/1 2/2 4/3\n";
+        std::fs::write(&obj, text + textured).unwrap();
+    }
+    input
+}
+
+fn entries(folder: &Path) -> Vec<PathBuf> {
+    let mut found = Vec::new();
+    let mut folders = vec![folder.to_path_buf()];
+    while let Some(folder) = folders.pop() {
+        for entry in std::fs::read_dir(folder).into_iter().flatten().flatten() {
+            if entry.path().is_dir() { folders.push(entry.path()) } else { found.push(entry.path()) }
+        }
+    }
+    found.sort();
+    found
+}
+
+const SIZE: [&str; 2] = ["--size", "64x36"];
+
+fn shown(t: &Path, input: &Path, out: &str, more: &[&str]) -> (BTreeMap<String, Vec<u8>>, String) {
+    let said = render(t, input, out, &[&SIZE, more].concat(), 0).stderr;
+    (pictures(&t.join(out)), said)
+}
+
+#[test]
+fn pictures_are_the_same_whatever_the_store_holds() {
+    let t = tempfile::tempdir().unwrap();
+    let t = t.path();
+    let input = scene(t);
+    let store = t.join("store");
+    let (without, _) = shown(t, &input, "without", &["--no-cache"]);
+    assert!(entries(&store).is_empty(), "--no-cache keeps something");
+    assert!(shown(t, &input, "cold", &["--cold"]).0 == without && entries(&store).is_empty());
+
+    assert!(shown(t, &input, "first", &[]).0 == without);
+    let kept = entries(&store);
+    // a texture and a tree
+    assert_eq!(kept.len(), 2, "{kept:?}");
+    assert!(shown(t, &input, "second", &[]).0 == without);
+    assert_eq!(entries(&store), kept);
+
+    for (round, damage) in ["flip", "cut", "empty", "swap"].into_iter().enumerate() {
+        for (i, path) in kept.iter().enumerate() {
+            let mut bytes = std::fs::read(path).unwrap();
+            match damage {
+                "flip" => {
+                    let at = bytes.len() * (round + i + 1) / 7;
+                    bytes[at] ^= 0x10;
+                }
+                "cut" => bytes.truncate(bytes.len() / 2),
+                "empty" => bytes.clear(),
+                _ => bytes = std::fs::read(&kept[0]).unwrap(),
+            }
+            std::fs::write(path, bytes).unwrap();
+        }
+        let (got, said) = shown(t, &input, &format!("{damage}ed"), &[]);
+        assert!(got == without && said.contains("damaged"), "{damage}: {said}");
+        let (got, said) = shown(t, &input, &format!("healed from {damage}"), &[]);
+        assert!(got == without && !said.contains("damaged"), "{damage}: {said}");
+        assert_eq!(entries(&store), kept);
+    }
+}
+
+#[test]
+fn a_store_that_cannot_be_written_stops_nothing() {
+    let t = tempfile::tempdir().unwrap();
+    let t = t.path();
+    let input = scene(t);
+    let file = t.join("file");
+    std::fs::write(&file, "no folder").unwrap();
+    let (without, _) = shown(t, &input, "without", &["--no-cache"]);
+    let (got, said) = shown(t, &input, "out", &["--cache", file.to_str().unwrap()]);
+    assert!(got == without && said.matches("--no-cache does without").count() == 1, "{said}");
+    assert_eq!(std::fs::read(file).unwrap(), b"no folder");
+}
+
+#[test]
+fn cache_tells_and_clears() {
+    let t = tempfile::tempdir().unwrap();
+    let t = t.path();
+    let input = scene(t);
+    shown(t, &input, "out", &[]);
+    let told = |what: &str| -> serde_json::Value {
+        let run = run(t, ["cache", what, "--json"]);
+        assert_eq!(run.status, 0, "{}", run.stderr);
+        serde_json::from_str(&run.stdout).unwrap()
+    };
+    let bytes: u64 = entries(&t.join("store")).iter().map(|p| p.metadata().unwrap().len()).sum();
+    assert_eq!((&told("stat")["entries"], &told("stat")["bytes"]), (&2.into(), &bytes.into()));
+    assert_eq!(told("gc")["removed"]["entries"], 0);
+    assert_eq!((&told("clear")["removed"]["entries"], &told("stat")["entries"]), (&2.into(), &0.into()));
+    // what another put there is not touched
+    std::fs::write(t.join("store/mine.txt"), "kept").unwrap();
+    told("clear");
+    assert!(t.join("store/mine.txt").exists());
+}
