@@ -1,6 +1,7 @@
 //! Bytes to values with diagnostics: OBJ, MTL and textures. The only room that reads scenes.
 
 mod error;
+mod gltf;
 mod library;
 mod lookup;
 mod material;
@@ -18,6 +19,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 pub use error::FormatError;
+pub use gltf::{ClipChoice, Gltf, GltfClips, GltfFrame, GltfOptions, NamedCamera, gltf_clips};
 pub use library::Library;
 pub use mtl::is_mtl_word;
 pub use obj::{ParsedObj, parse_obj};
