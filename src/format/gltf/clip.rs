@@ -22,6 +22,13 @@ pub enum ClipChoice {
     Named(String),
 }
 
+impl ClipChoice {
+    /// From the word that users give: `all`, or a name.
+    pub fn from_word(word: &str) -> Self {
+        if word == "all" { Self::All } else { Self::Named(word.to_owned()) }
+    }
+}
+
 /// What moves one property of one node.
 #[derive(Clone, Debug)]
 pub(super) struct Channel {

@@ -202,6 +202,20 @@ fn check_extensions(root: &Root) -> Result<(), Cause> {
     )))
 }
 
+/// The buffers and images that a file names; what cannot be read names nothing.
+pub(in crate::format) fn named_files(path: &Path) -> Vec<PathBuf> {
+    let Ok((root, _)) = text::read(path).map_err(drop).and_then(|bytes| parse(&bytes).map_err(drop)) else {
+        return Vec::new();
+    };
+    let uris = root.buffers.iter().map(|b| &b.uri).chain(root.images.iter().map(|i| &i.uri));
+    uris.flatten()
+        .filter_map(|uri| match uri::target(uri) {
+            Ok(uri::Target::File(name)) => Some(path.parent().unwrap_or(Path::new("")).join(name)),
+            _ => None,
+        })
+        .collect()
+}
+
 /// Extensions that are used and change nothing here.
 pub(super) fn idle_extensions(root: &Root) -> impl Iterator<Item = &str> {
     root.extensions_used.iter().map(String::as_str).filter(|name| !KNOWN_EXTENSIONS.contains(name))

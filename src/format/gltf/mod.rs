@@ -37,6 +37,7 @@ use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 
 pub use clip::ClipChoice;
+pub(super) use file::named_files;
 pub use light::NamedCamera;
 
 /// What is wrong with a file and what to do, to stand behind its name.
@@ -106,6 +107,11 @@ pub struct Gltf {
     pub inputs: Vec<PathBuf>,
     /// Bytes that were read.
     pub bytes_read: u64,
+}
+
+/// Whether a file's name is that of a glTF.
+pub fn is_gltf(path: &Path) -> bool {
+    path.extension().is_some_and(|e| e.eq_ignore_ascii_case("gltf") || e.eq_ignore_ascii_case("glb"))
 }
 
 /// What clips a file has, and how long those that are chosen are; meshes and images are not looked at.
