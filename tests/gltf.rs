@@ -7,6 +7,7 @@ mod common;
 use common::{assert_same, pictures, render, report};
 use rentix::format::{ClipChoice, Gltf, GltfOptions};
 use std::collections::HashMap;
+use std::fmt::Write;
 use std::path::Path;
 
 /// The greatest distance from the oracle's place, of the diagonal of the model's box.
@@ -73,7 +74,10 @@ fn write_mover(path: &Path) {
         &[0.0, 0.0, 0.0, 0.0, 0.0, -1.0],
     ]
     .concat();
-    let bytes: String = floats.iter().flat_map(|x| x.to_le_bytes()).map(|b| format!("%{b:02x}")).collect();
+    let mut bytes = String::new();
+    for byte in floats.iter().flat_map(|x| x.to_le_bytes()) {
+        write!(bytes, "%{byte:02x}").unwrap();
+    }
     let accessor = |at: usize, count: usize, kind: &str| {
         format!(
             r#"{{"bufferView":0,"byteOffset":{at},"count":{count},"type":"{kind}","componentType":5126}}"#

@@ -76,6 +76,7 @@ impl Animations {
     ) -> Result<(Arc<Gltf>, bool), FormatError> {
         let options = GltfOptions {
             smooth_angle_deg: options.smooth_angle_deg,
+            material_overrides: options.material_overrides.clone(),
             texture_limit_bytes: self.texture_limit_bytes,
         };
         let stamp = stamp(path);
@@ -151,7 +152,7 @@ fn place_light(light: &mut Light, layer: &DAffine3) {
 /// What is told of a file when the first picture uses it.
 pub(super) fn tell(gltf: &Gltf, path: &Path, options: &ReadOptions, warnings: &mut Warnings) {
     warnings.merge(&gltf.warnings);
-    if options.materials_file.is_some() || !options.material_overrides.is_empty() {
-        warnings.add(Some(path), None, "what the job says of materials is not laid over those of a glTF");
+    if options.materials_file.is_some() {
+        warnings.add(Some(path), None, "a layer's MTL is not laid over the materials of a glTF");
     }
 }

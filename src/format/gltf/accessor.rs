@@ -158,7 +158,7 @@ mod tests {
 
     /// A file of one buffer (0, 1, … 255) whose accessors are given.
     fn file(views: &str, accessors: &str) -> File {
-        let bytes: String = (0..=255u8).map(|b| format!("%{b:02x}")).collect();
+        let bytes = super::super::uri::escaped(&(0..=255u8).collect::<Vec<_>>());
         let json = format!(
             r#"{{"asset":{{"version":"2.0"}},"buffers":[{{"byteLength":256,"uri":"data:,{bytes}"}}],
             "bufferViews":[{views}],"accessors":[{accessors}]}}"#

@@ -76,7 +76,7 @@ fn slerp(a: &[f64], b: &[f64], s: f64) -> Vec<f64> {
     normalize(&mut b);
     let dot: f64 = a.iter().zip(&b).map(|(a, b)| a * b).sum();
     if dot < 0.0 {
-        b.iter_mut().for_each(|x| *x = -*x);
+        b = b.into_iter().map(|x| -x).collect();
     }
     // the angle by its tangent: exact for small ones too
     let length =
@@ -95,7 +95,9 @@ fn slerp(a: &[f64], b: &[f64], s: f64) -> Vec<f64> {
 fn normalize(q: &mut [f64]) {
     let length = q.iter().map(|x| x * x).sum::<f64>().sqrt();
     if length > 0.0 && length.is_finite() {
-        q.iter_mut().for_each(|x| *x /= length);
+        for x in q {
+            *x /= length;
+        }
     } else if let [x, y, z, w] = q {
         (*x, *y, *z, *w) = (0.0, 0.0, 0.0, 1.0);
     }

@@ -1,4 +1,4 @@
-//! Lights (KHR_lights_punctual) and cameras.
+//! Lights (`KHR_lights_punctual`) and cameras.
 //!
 //! A point or spot light's intensity, candela, is ours with 1/d²; a directional one's, lux, is ours as it stands. Our
 //! diffuse term has no 1/π, so that surfaces are π times as bright as glTF's formulas make them.

@@ -2,16 +2,16 @@
 //!
 //! | glTF | MTL |
 //! | --- | --- |
-//! | base colour b, metallic m | Kd = b·(1 − m), map_Kd the base texture; Ks = 0.04·(1 − m) + b·m, map_Ks the base texture from m = 0.5 on |
+//! | base colour b, metallic m | Kd = b·(1 − m), `map_Kd` the base texture; Ks = 0.04·(1 − m) + b·m, `map_Ks` the base texture from m = 0.5 on |
 //! | roughness r | Ns = 2/r⁴ − 2, from 1 to 1000 |
 //! | (both) | illum 2, Ka 0 |
 //! | metallicRoughnessTexture | its mean |
 //! | transmission t > 0 | illum 7, Ni = ior (1.5), Tf = b·t (a base texture by its mean), Kd·(1 − t), Ks 0: Fresnel's by Ni |
-//! | emissive · strength | Ke, map_Ke |
-//! | alphaMode OPAQUE, MASK, BLEND | d 1; d and map_d 0 or 1 by the cutoff; d and map_d alpha |
+//! | emissive · strength | Ke, `map_Ke` |
+//! | alphaMode OPAQUE, MASK, BLEND | d 1; d and `map_d` 0 or 1 by the cutoff; d and `map_d` alpha |
 //! | unlit | illum 0, Kd = b |
 //! | normalTexture | norm |
-//! | KHR_texture_transform | scale and offset of the map |
+//! | `KHR_texture_transform` | scale and offset of the map |
 //!
 //! What has no word is named once: rotated textures, `normalTexture.scale`, occlusion, texture coordinates other than
 //! the first. Without effect are doubleSided (all surfaces have two sides) and the filters of samplers (ours are
@@ -19,7 +19,9 @@
 
 use super::Cause;
 use super::file::File;
+use super::overlay::laid_over;
 use super::picture::Pictures;
+use crate::format::mtl::Given;
 use crate::format::texture::{TextureUse, share_texture};
 use crate::math::LINEAR_FROM_SRGB8;
 use crate::scene::{Channel, Map, Material, Part, TexelSpace, Texels, Texture};
@@ -42,13 +44,13 @@ const EXPONENTS: (f32, f32) = (1.0, 1000.0);
 pub(super) struct Materials {
     pub pictures: Pictures,
     made: HashMap<usize, Part<Material>>,
-    /// For each material made its name.
-    pub names: Vec<(Part<Material>, String)>,
+    /// What the job says of materials, by their names.
+    overlays: HashMap<Vec<u8>, Given>,
 }
 
 impl Materials {
-    pub(super) fn new(pictures: Pictures) -> Self {
-        Self { pictures, made: HashMap::new(), names: Vec::new() }
+    pub(super) fn new(pictures: Pictures, overlays: HashMap<Vec<u8>, Given>) -> Self {
+        Self { pictures, made: HashMap::new(), overlays }
     }
 
     /// The material in that place of the file.
@@ -67,8 +69,15 @@ impl Materials {
             .get(index)
             .ok_or_else(|| Cause::broken(format!("material {index} is named and is not there")))?;
         let mut maps = Maps { file, pictures: &mut self.pictures, warnings };
-        let made = Part::new(material(given, &mut maps)?);
-        self.names.push((made.clone(), given.name.clone().unwrap_or_default()));
+        let mut made = material(given, &mut maps)?;
+        let name = given.name.as_deref().unwrap_or_default();
+        if let Some(overlay) = self.overlays.get(name.as_bytes()) {
+            if !overlay.maps.is_empty() {
+                maps.warn("maps that the job gives to a glTF's material are not laid over its own");
+            }
+            made = laid_over(made, overlay);
+        }
+        let made = Part::new(made);
         self.made.insert(index, made.clone());
         Ok(made)
     }
@@ -307,7 +316,7 @@ mod tests {
     fn made(material: &str) -> (Material, Vec<String>) {
         // a TGA: 18 bytes of header, 2x1, 32 bits, from the top; blue, green, red, alpha
         let tga = [0, 0, 2, 0, 0, 0, 0, 0, 0, 0, 0, 0, 2, 0, 1, 0, 32, 0x28, 255, 255, 255, 255, 0, 0, 0, 64];
-        let data: String = tga.iter().map(|b| format!("%{b:02x}")).collect();
+        let data = super::super::uri::escaped(&tga);
         let json = format!(
             r#"{{"asset":{{"version":"2.0"}},"images":[{{"uri":"data:,{data}"}}],
             "samplers":[{{"wrapS":33071,"wrapT":33071}},{{"wrapS":33071}}],
@@ -316,7 +325,7 @@ mod tests {
         );
         let file = File::from_bytes(json.as_bytes(), Path::new("x.tga")).unwrap();
         let mut warnings = Warnings::default();
-        let mut materials = Materials::new(Pictures::with_limit(u64::MAX));
+        let mut materials = Materials::new(Pictures::with_limit(u64::MAX), HashMap::new());
         let made = materials.get(&file, 0, &mut warnings).unwrap();
         ((*made).clone(), warnings.list().into_iter().map(|w| w.text).collect())
     }

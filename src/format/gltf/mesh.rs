@@ -7,13 +7,14 @@ use crate::math::srgb_from_linear;
 use crate::scene::normals::{self, Smoothing};
 use crate::scene::{
     ABSENT, Attribute, Colors, Corners, Faces, Geometry, Material, MaterialRuns, Mesh, Normals, Part,
-    Positions, Texcoords, Triangles,
+    PartHash, Positions, Texcoords, Triangles,
 };
 use crate::warning::Warnings;
 use gltf::json;
 use gltf::json::accessor::Type;
 use gltf::json::mesh::{Mode, Primitive, Semantic};
 use gltf::json::validation::Checked;
+use std::collections::HashMap;
 use std::sync::Arc;
 
 /// The most vertices and the most triangles of a mesh: all indices fit 32 bits with room to spare.
@@ -48,6 +49,9 @@ pub(super) struct Influences {
     pub list: Vec<(u32, f64)>,
 }
 
+/// Reads an attribute of one of those types that has an element for each vertex.
+type VertexList<'a> = &'a dyn Fn(json::Index<json::Accessor>, &[Type]) -> Result<accessor::Numbers, Cause>;
+
 /// A mesh that grows by its primitives.
 #[derive(Default)]
 struct Growing {
@@ -60,6 +64,7 @@ struct Growing {
     normal_corners: Vec<[u32; 3]>,
     runs: Vec<[u32; 2]>,
     materials: Vec<Part<Material>>,
+    slots: HashMap<PartHash, u32>,
     targets: Vec<Target>,
     influences: Influences,
     has: Has,
@@ -67,6 +72,7 @@ struct Growing {
 
 /// Which attributes any primitive has.
 #[derive(Default)]
+#[allow(clippy::struct_excessive_bools, reason = "one for each attribute")]
 struct Has {
     normals: bool,
     texcoords: bool,
@@ -202,11 +208,10 @@ impl Growing {
     }
 
     fn slot(&mut self, material: Part<Material>) -> u32 {
-        let known = self.materials.iter().position(|m| *m == material);
-        known.unwrap_or_else(|| {
+        *self.slots.entry(material.hash()).or_insert_with(|| {
             self.materials.push(material);
-            self.materials.len() - 1
-        }) as u32
+            self.materials.len() as u32 - 1
+        })
     }
 
     /// Colours are seen where there is no material.
@@ -216,7 +221,7 @@ impl Growing {
         primitive: &Primitive,
         first: usize,
         count: usize,
-        vertex_list: &dyn Fn(json::Index<json::Accessor>, &[Type]) -> Result<accessor::Numbers, Cause>,
+        vertex_list: VertexList<'_>,
         warnings: &mut Warnings,
     ) -> Result<(), Cause> {
         let Some(&index) = primitive.attributes.get(&Checked::Valid(Semantic::Colors(0))) else {
@@ -243,7 +248,7 @@ impl Growing {
         &mut self,
         primitive: &Primitive,
         count: usize,
-        vertex_list: &dyn Fn(json::Index<json::Accessor>, &[Type]) -> Result<accessor::Numbers, Cause>,
+        vertex_list: VertexList<'_>,
     ) -> Result<(), Cause> {
         let mut sets = Vec::new();
         for set in 0..u32::MAX {
@@ -268,7 +273,9 @@ impl Growing {
             }
             let own = &mut self.influences.list[start..];
             let sum: f64 = own.iter().map(|(_, weight)| weight).sum();
-            own.iter_mut().for_each(|(_, weight)| *weight /= sum);
+            for (_, weight) in own {
+                *weight /= sum;
+            }
             self.influences.ends.push(self.influences.list.len() as u32);
         }
         Ok(())

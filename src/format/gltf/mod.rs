@@ -13,6 +13,7 @@ mod light;
 mod material;
 mod mesh;
 mod morph;
+mod overlay;
 mod picture;
 mod pose;
 mod skin;
@@ -20,6 +21,7 @@ mod skin;
 mod tests;
 mod uri;
 
+use super::MaterialOverride;
 use super::error::FormatError;
 use crate::math::{Bounds, DAffine3, DVec3};
 use crate::scene::{Attribute, Geometry, Light, Normals, Object, Part, Positions};
@@ -33,6 +35,7 @@ use picture::Pictures;
 use pose::{Nodes, Pose};
 use skin::{Skin, skinned};
 use std::collections::HashMap;
+use std::collections::hash_map::Entry;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -60,6 +63,8 @@ impl Cause {
 pub struct GltfOptions {
     /// Normals are smoothed over triangles within this angle, degrees, where the file gives none; None: they are flat.
     pub smooth_angle_deg: Option<f32>,
+    /// Statements for materials by name that are laid over the file's; maps are not.
+    pub material_overrides: Vec<MaterialOverride>,
     /// The most bytes that its textures may take together, mip levels included; None: any.
     pub texture_limit_bytes: Option<u64>,
 }
@@ -87,18 +92,32 @@ pub struct GltfClips {
     pub left_out: Option<String>,
 }
 
-/// A glTF file in memory.
+/// What is shown of a file.
 #[derive(Debug)]
-pub struct Gltf {
-    file: File,
+struct Content {
     clips: Vec<Clip>,
     nodes: Nodes,
     /// Meshes by their places in the file, those that are shown.
     shapes: HashMap<usize, Shape>,
     /// Skins by their places in the file, those that are used.
     skins: HashMap<usize, Skin>,
-    /// For each node that deforms the last pose and what it made.
-    deformed: Mutex<HashMap<usize, (Vec<u64>, Arc<Geometry>)>>,
+}
+
+/// A mesh in a pose.
+#[derive(Debug)]
+struct Deformed {
+    /// The bits of all matrices and weights.
+    pose: Vec<u64>,
+    geometry: Arc<Geometry>,
+}
+
+/// A glTF file in memory.
+#[derive(Debug)]
+pub struct Gltf {
+    file: File,
+    content: Content,
+    /// For each node that deforms its last pose.
+    deformed: Mutex<HashMap<usize, Deformed>>,
     /// What is wrong but does not stop a frame, and what is not mapped, each once.
     pub warnings: Warnings,
     /// Images that were named and cannot be had, each as a sentence.
@@ -151,11 +170,11 @@ impl Gltf {
 
     fn new(file: File, options: &GltfOptions) -> Result<Self, FormatError> {
         let mut warnings = Warnings::default();
-        let mut materials =
-            Materials::new(Pictures::with_limit(options.texture_limit_bytes.unwrap_or(u64::MAX)));
+        let pictures = Pictures::with_limit(options.texture_limit_bytes.unwrap_or(u64::MAX));
+        let mut materials = Materials::new(pictures, overlay::overlays(&options.material_overrides)?);
         let read = Self::read(&file, options, &mut materials, &mut warnings);
         materials.pictures.within_limit(&file)?;
-        let (clips, nodes, shapes, skins) = read.map_err(|cause| cause.at(&file.path))?;
+        let content = read.map_err(|cause| cause.at(&file.path))?;
         for name in file::idle_extensions(&file.root) {
             warnings.add(Some(&file.path), None, format!("the extension {name} is not mapped"));
         }
@@ -166,40 +185,39 @@ impl Gltf {
             bytes_read: file.bytes_read + pictures.bytes_read,
             missing: pictures.missing,
             file,
-            clips,
-            nodes,
-            shapes,
-            skins,
+            content,
             deformed: Mutex::default(),
             warnings,
         })
     }
 
-    #[allow(clippy::type_complexity, reason = "the parts of a value that is made in one place")]
     fn read(
         file: &File,
         options: &GltfOptions,
         materials: &mut Materials,
         warnings: &mut Warnings,
-    ) -> Result<(Vec<Clip>, Nodes, HashMap<usize, Shape>, HashMap<usize, Skin>), Cause> {
+    ) -> Result<Content, Cause> {
         let clips = clip::clips(file, warnings)?;
         let nodes = Nodes::read(file, &clips)?;
         let (mut shapes, mut skins) = (HashMap::new(), HashMap::new());
         for &i in &nodes.shown {
             let node = &file.root.nodes[i];
             let Some(mesh) = node.mesh.map(|mesh| mesh.value()) else { continue };
-            if !shapes.contains_key(&mesh) {
-                let shape = mesh::shape(file, mesh, materials, options.smooth_angle_deg, warnings)?;
-                shapes.insert(mesh, shape);
-            }
+            let shape = match shapes.entry(mesh) {
+                Entry::Occupied(known) => known.into_mut(),
+                Entry::Vacant(new) => {
+                    new.insert(mesh::shape(file, mesh, materials, options.smooth_angle_deg, warnings)?)
+                }
+            };
             let Some(skin) = node.skin.map(|skin| skin.value()) else { continue };
-            if !skins.contains_key(&skin) {
-                skins.insert(skin, skin::skin(file, skin)?);
+            let joints = match skins.entry(skin) {
+                Entry::Occupied(known) => known.into_mut(),
+                Entry::Vacant(new) => new.insert(skin::skin(file, skin)?),
             }
-            let joints = skins[&skin].joints();
-            match &shapes[&mesh].influences {
+            .joints();
+            match &shape.influences {
                 None => {
-                    warnings.add(Some(&file.path), None, "a skinned mesh names no joints and stands still")
+                    warnings.add(Some(&file.path), None, "a skinned mesh names no joints and stands still");
                 }
                 Some(influences) => {
                     if influences.list.iter().any(|&(joint, _)| joint as usize >= joints) {
@@ -209,12 +227,12 @@ impl Gltf {
                 }
             }
         }
-        Ok((clips, nodes, shapes, skins))
+        Ok(Content { clips, nodes, shapes, skins })
     }
 
     /// The names of all clips; the place of one without a name.
     pub fn clip_names(&self) -> impl Iterator<Item = &str> {
-        self.clips.iter().map(|clip| clip.name.as_str())
+        self.content.clips.iter().map(|clip| clip.name.as_str())
     }
 
     /// The greatest time of the keys of those clips, seconds; 0 where none plays.
@@ -222,11 +240,11 @@ impl Gltf {
     /// # Errors
     /// Where there is no such clip.
     pub fn duration_s(&self, choice: &ClipChoice) -> Result<f64, FormatError> {
-        Ok(clip::duration_s(&self.clips, &self.chosen(choice)?))
+        Ok(clip::duration_s(&self.content.clips, &self.chosen(choice)?))
     }
 
     fn chosen(&self, choice: &ClipChoice) -> Result<Vec<usize>, FormatError> {
-        clip::chosen(&self.clips, choice).map_err(|cause| cause.at(&self.file.path))
+        clip::chosen(&self.content.clips, choice).map_err(|cause| cause.at(&self.file.path))
     }
 
     /// What is shown at a time, seconds.
@@ -235,9 +253,9 @@ impl Gltf {
     /// Where there is no such clip, or a vertex that is used goes where no f32 does.
     pub fn frame(&self, time_s: f64, choice: &ClipChoice) -> Result<GltfFrame, FormatError> {
         let chosen = self.chosen(choice)?;
-        let pose = self.nodes.pose(time_s, chosen.iter().map(|&i| &self.clips[i]));
+        let pose = self.content.nodes.pose(time_s, chosen.iter().map(|&i| &self.content.clips[i]));
         let mut frame = GltfFrame { objects: Vec::new(), cameras: Vec::new(), lights: Vec::new() };
-        for &i in &self.nodes.shown {
+        for &i in &self.content.nodes.shown {
             let (node, world) = (&self.file.root.nodes[i], &pose.worlds[i]);
             frame.lights.extend(light::light(&self.file, node, world));
             frame.cameras.extend(light::camera(&self.file, node, world));
@@ -265,13 +283,14 @@ impl Gltf {
     /// The mesh at a node; None where it has none.
     fn object(&self, i: usize, pose: &Pose) -> Result<Option<Object>, Cause> {
         let node = &self.file.root.nodes[i];
-        let Some((mesh, shape)) = node.mesh.and_then(|m| Some((m.value(), self.shapes.get(&m.value())?)))
+        let Some((mesh, shape)) =
+            node.mesh.and_then(|m| Some((m.value(), self.content.shapes.get(&m.value())?)))
         else {
             return Ok(None);
         };
-        let skin = node.skin.and_then(|skin| self.skins.get(&skin.value()));
+        let skin = node.skin.and_then(|skin| self.content.skins.get(&skin.value()));
         let bones = skin.zip(shape.influences.as_ref());
-        let transform = (self.nodes.is_placed[i] && bones.is_none()).then(|| pose.worlds[i]);
+        let transform = (self.content.nodes.is_placed[i] && bones.is_none()).then(|| pose.worlds[i]);
         if transform.is_some_and(|world| !world.is_finite()) {
             return Err(Cause(format!("node {i} is moved beyond all numbers")));
         }
@@ -285,8 +304,8 @@ impl Gltf {
         let bits: Vec<u64> = numbers.map(f64::to_bits).collect();
         {
             let held = self.deformed.lock().unwrap_or_else(PoisonError::into_inner);
-            if let Some((_, geometry)) = held.get(&i).filter(|(known, _)| *known == bits) {
-                return Ok(Some(Object { geometry: Arc::clone(geometry), transform }));
+            if let Some(known) = held.get(&i).filter(|known| known.pose == bits) {
+                return Ok(Some(Object { geometry: Arc::clone(&known.geometry), transform }));
             }
         }
         let geometry =
@@ -296,7 +315,7 @@ impl Gltf {
                 })?;
         let geometry = Arc::new(geometry);
         let mut held = self.deformed.lock().unwrap_or_else(PoisonError::into_inner);
-        held.insert(i, (bits, Arc::clone(&geometry)));
+        held.insert(i, Deformed { pose: bits, geometry: Arc::clone(&geometry) });
         Ok(Some(Object { geometry, transform }))
     }
 }

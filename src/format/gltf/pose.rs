@@ -5,6 +5,7 @@ use super::clip::Clip;
 use super::file::File;
 use crate::math::{DAffine3, DMat3, DVec3};
 use glam::DQuat;
+use gltf::json::Index;
 use gltf::json::animation::Property;
 use std::collections::HashMap;
 
@@ -59,7 +60,7 @@ impl Nodes {
         let count = root.nodes.len();
         let mut parents = vec![None; count];
         for (i, node) in root.nodes.iter().enumerate() {
-            for child in node.children.iter().flatten().map(|child| child.value()) {
+            for child in node.children.iter().flatten().map(Index::value) {
                 let parent = parents.get_mut(child).ok_or_else(|| {
                     Cause::broken(format!("node {i} has child {child}, which is not there"))
                 })?;
@@ -84,7 +85,7 @@ impl Nodes {
         let shown = match scene {
             None => order.clone(),
             Some(scene) => {
-                let tops: Vec<usize> = scene.nodes.iter().map(|node| node.value()).collect();
+                let tops: Vec<usize> = scene.nodes.iter().map(Index::value).collect();
                 if let Some(absent) = tops.iter().find(|&&top| top >= count) {
                     return Err(Cause::broken(format!("its scene has node {absent}, which is not there")));
                 }
@@ -149,7 +150,7 @@ fn walk(file: &File, tops: &[usize]) -> Vec<usize> {
     while let Some(i) = stack.pop() {
         order.push(i);
         let children = nodes.get(i).and_then(|node| node.children.as_deref()).unwrap_or_default();
-        stack.extend(children.iter().rev().map(|child| child.value()));
+        stack.extend(children.iter().rev().map(Index::value));
         // each node has one parent, so that more than all of them are named again by the scene itself
         if order.len() > 2 * nodes.len() {
             break;

@@ -4,6 +4,7 @@ use super::file::File;
 use super::mesh::Influences;
 use super::{Cause, accessor};
 use crate::math::{DAffine3, DMat3, DVec3};
+use gltf::json::Index;
 use gltf::json::accessor::Type;
 
 /// A skin.
@@ -19,7 +20,7 @@ pub(super) struct Skin {
 pub(super) fn skin(file: &File, index: usize) -> Result<Skin, Cause> {
     let broken = |text: &str| Cause::broken(format!("skin {index} {text}"));
     let skin = file.root.skins.get(index).ok_or_else(|| broken("is named and is not there"))?;
-    let joints: Vec<usize> = skin.joints.iter().map(|joint| joint.value()).collect();
+    let joints: Vec<usize> = skin.joints.iter().map(Index::value).collect();
     if joints.iter().any(|&joint| joint >= file.root.nodes.len()) {
         return Err(broken("has a joint that is not there"));
     }

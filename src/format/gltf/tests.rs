@@ -192,7 +192,11 @@ fn random(state: &mut u64) -> u64 {
 
 /// Opens what may be broken and shows it; whatever happens must be a value.
 fn survives(bytes: &[u8]) -> bool {
-    let options = GltfOptions { texture_limit_bytes: Some(1 << 26), smooth_angle_deg: Some(30.0) };
+    let options = GltfOptions {
+        texture_limit_bytes: Some(1 << 26),
+        smooth_angle_deg: Some(30.0),
+        ..GltfOptions::default()
+    };
     let Ok(gltf) = Gltf::from_bytes(bytes, Path::new("/nowhere/x.glb"), &options) else { return false };
     let mut shown = false;
     for time_s in [0.0, 0.7, f64::NAN, -1e300] {
@@ -204,7 +208,7 @@ fn survives(bytes: &[u8]) -> bool {
 /// Changes bytes, numbers in the JSON, or lengths.
 fn mutated(bytes: &[u8], state: &mut u64) -> Vec<u8> {
     let mut changed = bytes.to_vec();
-    for _ in 0..1 + random(state) % 4 {
+    for _ in 0..=random(state) % 4 {
         let at = random(state) as usize % changed.len();
         match random(state) % 5 {
             0 => changed[at] = random(state) as u8,

@@ -61,6 +61,19 @@ fn unescaped(text: &str) -> Vec<u8> {
     plain
 }
 
+/// Any bytes as they stand in a data URI.
+#[cfg(test)]
+pub(super) fn escaped(bytes: &[u8]) -> String {
+    bytes
+        .iter()
+        .flat_map(|byte| [b'%', byte >> 4, byte & 15])
+        .map(|digit| match digit {
+            b'%' => '%',
+            digit => char::from_digit(digit.into(), 16).unwrap(),
+        })
+        .collect()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
