@@ -67,6 +67,7 @@ const ONE_PLACE: &[OnePlace] = &[
         names: &["tobj"],
         places: Places::Only(&["format"]),
     },
+    OnePlace { rule: "only format reads glTF", names: &["gltf"], places: Places::Only(&["format"]) },
     OnePlace {
         rule: "only output knows picture formats; format decodes textures",
         names: &["png", "exr", "image", "openjp2", "tiff"],

@@ -31,7 +31,7 @@ impl From<UpdateWord> for Update {
 #[derive(Args, Debug)]
 #[allow(clippy::struct_excessive_bools, reason = "each is a switch that a user types")]
 pub(super) struct RenderArgs {
-    /// Folders of OBJ frames, patterns (walk_####.obj, walk_%04d.obj, 'walk/*.obj'), OBJ files, job files (.yaml)
+    /// Folders of OBJ frames, patterns (walk_####.obj, walk_%04d.obj, 'walk/*.obj'), OBJ and glTF files, job files (.yaml)
     #[arg(value_name = "INPUT")]
     pub inputs: Vec<PathBuf>,
 
@@ -44,7 +44,7 @@ pub(super) struct RenderArgs {
     /// Picture format: png exr ppm pgm pbm jpg bmp tif jp2 ras tga webp qoi hdr … [default: png]
     #[arg(long, value_name = "EXT", help_heading = "Output")]
     pub format: Option<String>,
-    /// Name of a picture: {stem}, {name}, {frame}, {frame:04} [default: {stem}; layers: {name}_{frame:04}]
+    /// Name of a picture: {stem}, {name}, {frame}, {frame:04} [default: {stem}; glTF: {stem}_{frame:04}; layers: {name}_{frame:04}]
     #[arg(long, value_name = "TEMPLATE", help_heading = "Output")]
     pub name: Option<String>,
     /// Leave the background out and keep coverage
@@ -81,6 +81,12 @@ pub(super) struct RenderArgs {
     /// All files in natural order of names are one sequence, numbered from 1
     #[arg(long, help_heading = "What to render")]
     pub one_sequence: bool,
+    /// Frames a second of glTF animations [default: 24]
+    #[arg(long, value_name = "N", help_heading = "What to render")]
+    pub fps: Option<f64>,
+    /// Clip of glTF animations, or all [default: all where no two animate the same, else the first]
+    #[arg(long, value_name = "NAME", help_heading = "What to render")]
+    pub clip: Option<String>,
     /// Gaps, missing materials and textures are errors
     #[arg(long, help_heading = "What to render")]
     pub strict: bool,

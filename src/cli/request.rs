@@ -1,6 +1,7 @@
 //! What was typed becomes what is asked of the job.
 
 use super::render_args::RenderArgs;
+use crate::format::ClipChoice;
 use crate::job::options::limits::{self, within};
 use crate::job::words::one_of;
 use crate::job::{CameraChoice, LightChoice, Options, Request, settings};
@@ -19,6 +20,8 @@ pub(super) fn request(args: &RenderArgs) -> Result<Request> {
         order: parsed("--order", args.order.as_deref())?.unwrap_or_default(),
         one_sequence: args.one_sequence,
         strict: args.strict,
+        fps: ranged("--fps", args.fps, &limits::FPS)?,
+        clip: args.clip.as_deref().map(ClipChoice::from_word),
         folder: args.output.clone(),
     })
 }

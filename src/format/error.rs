@@ -51,6 +51,14 @@ pub enum FormatError {
         /// What is wrong with it and what to do.
         cause: String,
     },
+    /// A glTF that is broken, or asks for what is not there.
+    #[error("{}: {cause}", path.display())]
+    BadGltf {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong with it and what to do.
+        cause: String,
+    },
     /// The textures of one frame take more memory than is allowed.
     #[error(
         "{}: its textures need more than {needed_bytes} bytes, {limit_bytes} are allowed; the frame is not rendered (raise --memory, or scale them down)", path.display()

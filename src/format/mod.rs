@@ -1,6 +1,7 @@
-//! Bytes to values with diagnostics: OBJ, MTL and textures. The only room that reads scenes.
+//! Bytes to values with diagnostics: OBJ, MTL, glTF and textures. The only room that reads scenes.
 
 mod error;
+mod gltf;
 mod library;
 mod lookup;
 mod material;
@@ -18,6 +19,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 pub use error::FormatError;
+pub use gltf::{ClipChoice, Gltf, GltfClips, GltfFrame, GltfOptions, NamedCamera, gltf_clips, is_gltf};
 pub use library::Library;
 pub use mtl::is_mtl_word;
 pub use obj::{ParsedObj, parse_obj};
@@ -105,9 +107,13 @@ pub fn scan_bounds(path: &Path) -> Result<Bounds, FormatError> {
     Ok(bounds)
 }
 
-/// The libraries that an OBJ names and the maps of all materials, as far as they are there. The shape is not
+/// The libraries that an OBJ names and the maps of all materials, as far as they are there; the buffers and images
+/// of a glTF. The shape is not
 /// read, and what cannot be read names nothing: this is for what must not be written over.
 pub fn named_files(path: &Path, options: &ReadOptions) -> Vec<PathBuf> {
+    if is_gltf(path) {
+        return gltf::named_files(path);
+    }
     let Ok(bytes) = text::read(path) else { return Vec::new() };
     let Ok(text) = Text::new(&bytes, path) else { return Vec::new() };
     library::Loader::new(path, options).named_files(&obj::library_statements(&text))

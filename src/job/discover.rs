@@ -1,14 +1,16 @@
 //! INPUT to sequences of files: folders, patterns, files (CONTRACT 2).
 
 use super::JobError;
+use super::animation::{self, Moment};
 use super::names::{Name, group};
 use super::pattern::Pattern;
+use crate::format::{self, ClipChoice};
 use crate::warning::Warnings;
 use std::fs;
 use std::path::{Path, PathBuf};
 
 /// A file that is one frame of a layer.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct FrameFile {
     /// Its number in the file name, if it has one.
     pub number: Option<i64>,
@@ -16,10 +18,12 @@ pub struct FrameFile {
     pub path: PathBuf,
     /// Its name without extension.
     pub stem: String,
+    /// What of a glTF file it shows; None: the file is an OBJ.
+    pub moment: Option<Moment>,
 }
 
 /// Files that are frames of one sequence, ordered by number.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq)]
 pub(super) struct Files {
     /// The folder's name, where they are all that is taken of it; else what their names have in common.
     pub(super) name: String,
@@ -28,32 +32,36 @@ pub(super) struct Files {
 
 /// How folders are taken.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Taking {
+pub(super) struct Taking<'a> {
     /// All files of an INPUT are one sequence, in natural order, numbered from 1.
     pub(super) one_sequence: bool,
     /// Gaps are errors.
     pub(super) strict: bool,
+    /// Frames a second of glTF files.
+    pub(super) fps: f64,
+    /// The clips of theirs that play.
+    pub(super) clip: &'a ClipChoice,
 }
 
 /// Finds the sequences of an INPUT.
 pub(super) fn discover(
     input: &Path,
-    taking: Taking,
+    taking: Taking<'_>,
     warnings: &mut Warnings,
 ) -> Result<Vec<Files>, JobError> {
     let found = if input.is_dir() {
         let files = list(input, &|name| is_obj(Path::new(name)))?;
         if files.is_empty() {
-            return Err(if list(input, &|n| is_gltf(Path::new(n))).is_ok_and(|f| !f.is_empty()) {
-                JobError::Gltf(input.to_path_buf())
-            } else {
-                JobError::NoFrames(input.to_path_buf())
-            });
+            let animations = list(input, &|name| format::is_gltf(Path::new(name)))?;
+            if animations.is_empty() {
+                return Err(JobError::NoFrames(input.to_path_buf()));
+            }
+            return animations.iter().map(|file| animation::frames(file, taking, warnings)).collect();
         }
         files
     } else if input.exists() {
-        if is_gltf(input) {
-            return Err(JobError::Gltf(input.to_path_buf()));
+        if format::is_gltf(input) {
+            return Ok(vec![animation::frames(input, taking, warnings)?]);
         }
         if !is_obj(input) {
             return Err(JobError::NotAnInput(input.to_path_buf()));
@@ -61,10 +69,16 @@ pub(super) fn discover(
         vec![input.to_path_buf()]
     } else if let Some(pattern) = pattern_of(input) {
         let folder = input.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
-        let files =
-            list(folder, &|name| is_obj(Path::new(name)) && pattern.matches(name.as_encoded_bytes()))?;
+        let matching = |is_wanted: fn(&Path) -> bool| {
+            list(folder, &|name| is_wanted(Path::new(name)) && pattern.matches(name.as_encoded_bytes()))
+        };
+        let files = matching(is_obj)?;
         if files.is_empty() {
-            return Err(JobError::NoMatch(input.to_path_buf()));
+            let animations = matching(format::is_gltf)?;
+            if animations.is_empty() {
+                return Err(JobError::NoMatch(input.to_path_buf()));
+            }
+            return animations.iter().map(|file| animation::frames(file, taking, warnings)).collect();
         }
         files
     } else {
@@ -106,6 +120,7 @@ fn frame_file(number: Option<i64>, path: &Path) -> FrameFile {
         number,
         path: path.to_path_buf(),
         stem: String::from_utf8_lossy(stem_bytes(path)).into_owned(),
+        moment: None,
     }
 }
 
@@ -134,10 +149,6 @@ pub(super) fn input_name(input: &Path) -> String {
 
 fn is_obj(path: &Path) -> bool {
     path.extension().is_some_and(|e| e.eq_ignore_ascii_case("obj"))
-}
-
-fn is_gltf(path: &Path) -> bool {
-    path.extension().is_some_and(|e| e.eq_ignore_ascii_case("gltf") || e.eq_ignore_ascii_case("glb"))
 }
 
 /// The plain files of a folder (links to files too) whose names are wanted, hidden ones left out, sorted by name.
@@ -200,7 +211,7 @@ fn gcd(a: i64, b: i64) -> i64 {
 mod tests {
     use super::*;
 
-    const TAKING: Taking = Taking { one_sequence: false, strict: false };
+    const TAKING: Taking = Taking { one_sequence: false, strict: false, fps: 24.0, clip: &ClipChoice::Auto };
 
     fn folder(names: &[&str]) -> tempfile::TempDir {
         let t = tempfile::tempdir().unwrap();

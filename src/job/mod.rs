@@ -1,5 +1,6 @@
 //! What is to be rendered: INPUT, frame numbers, job file, layers, cameras and transforms over time.
 
+mod animation;
 pub mod auto;
 mod discover;
 mod file;
@@ -13,6 +14,7 @@ mod template;
 pub mod track;
 pub mod words;
 
+pub use animation::Moment;
 pub use discover::FrameFile;
 pub use file::Outside;
 pub use numbers::{Chunk, FrameSet, Order};
@@ -20,12 +22,16 @@ pub use options::{Background, CameraChoice, LightChoice, Options};
 pub use resolve::resolve;
 pub use settings::Settings;
 
+use crate::format::{ClipChoice, FormatError};
 use crate::math::DAffine3;
 use crate::warning::Warnings;
 use std::io;
 use std::path::PathBuf;
 use std::sync::Arc;
 use track::Placed;
+
+/// No sequence that is made here has more pictures.
+const MAX_FRAMES: u64 = 1_000_000;
 
 /// What was asked for.
 #[derive(Clone, Debug, Default)]
@@ -46,6 +52,10 @@ pub struct Request {
     pub one_sequence: bool,
     /// `--strict`.
     pub strict: bool,
+    /// `--fps`: frames a second of glTF files.
+    pub fps: Option<f64>,
+    /// `--clip`.
+    pub clip: Option<ClipChoice>,
     /// `-o`.
     pub folder: Option<PathBuf>,
 }
@@ -134,23 +144,23 @@ fn main_file<'a>(layers: &'a [Layer], sources: &[Source]) -> Option<&'a FrameFil
 #[derive(Debug, thiserror::Error)]
 pub enum JobError {
     /// Nothing was named.
-    #[error("no INPUT; name a folder of OBJ frames, an OBJ file or a job file")]
+    #[error("no INPUT; name a folder of OBJ frames, an OBJ or glTF file or a job file")]
     NoInput,
     /// There is no such file, folder or pattern.
     #[error("{}: there is no such file or folder; check the name", .0.display())]
     Absent(PathBuf),
     /// A folder without frames.
-    #[error("{}: no .obj file in this folder; name a folder that holds the frames", .0.display())]
+    #[error("{}: no .obj, .gltf or .glb file in this folder; name a folder that holds the frames", .0.display())]
     NoFrames(PathBuf),
     /// A pattern without matches.
-    #[error("{}: no .obj file matches this pattern", .0.display())]
+    #[error("{}: no .obj, .gltf or .glb file matches this pattern", .0.display())]
     NoMatch(PathBuf),
     /// Some other file.
-    #[error("{}: is neither a folder nor an .obj, .yaml or .yml file", .0.display())]
+    #[error("{}: is neither a folder nor an .obj, .gltf, .glb, .yaml or .yml file", .0.display())]
     NotAnInput(PathBuf),
-    /// glTF comes with a later version.
-    #[error("{}: glTF is not supported by this version; export OBJ frames", .0.display())]
-    Gltf(PathBuf),
+    /// A glTF file that cannot be read, or has no such clip.
+    #[error(transparent)]
+    BadGltf(FormatError),
     /// The system refuses.
     #[error("{}: cannot be read: {source}; check that it exists and that its permissions allow reading", path.display())]
     Unreadable {

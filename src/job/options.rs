@@ -13,6 +13,13 @@ pub enum CameraChoice {
     Auto,
     /// As given, over time.
     Given(CameraTrack),
+    /// The one of that name in the glTF files of the frame.
+    Gltf {
+        /// Its name or its node's.
+        name: String,
+        /// A field of view instead of its own, degrees.
+        fov_deg: Option<f64>,
+    },
 }
 
 /// Where the lights come from.

@@ -1,10 +1,12 @@
 //! From what was asked for to the list of pictures.
 
+use super::animation;
 use super::discover::{self, Files, Taking};
 use super::file::{self, JobFile, LayerFile, Outside, Override};
 use super::template::{Fill, fill};
 use super::{
-    FrameFile, FrameSet, Job, JobError, Layer, Picture, Request, Sequence, Settings, Source, main_file,
+    FrameFile, FrameSet, Job, JobError, Layer, MAX_FRAMES, Picture, Request, Sequence, Settings, Source,
+    main_file,
 };
 use crate::warning::Warnings;
 use std::collections::{HashMap, HashSet};
@@ -48,8 +50,9 @@ pub fn resolve(request: &Request) -> Result<Job, JobError> {
     let mut name = of_job.clone();
     if job_file.layers.is_empty() {
         let own: Vec<&PathBuf> = job_file.sequence.iter().collect();
+        let taking = Resolving::taking(request, &job_file);
         for input in if inputs.is_empty() { own } else { inputs } {
-            for files in discover::discover(input, job.taking(), &mut job.warnings)? {
+            for files in discover::discover(input, taking, &mut job.warnings)? {
                 job.add_sequence(of_job.as_deref(), files, &job_file)?;
             }
             name.get_or_insert_with(|| discover::input_name(input));
@@ -79,9 +82,6 @@ pub fn resolve(request: &Request) -> Result<Job, JobError> {
     })
 }
 
-/// No job of layers has more pictures.
-const MAX_FRAMES: u64 = 1_000_000;
-
 fn is_job_file(path: &Path) -> bool {
     let is_yaml = |e: &std::ffi::OsStr| e.eq_ignore_ascii_case("yaml") || e.eq_ignore_ascii_case("yml");
     path.extension().is_some_and(is_yaml) && !path.is_dir()
@@ -98,8 +98,14 @@ struct Resolving<'a> {
 }
 
 impl Resolving<'_> {
-    fn taking(&self) -> Taking {
-        Taking { one_sequence: self.request.one_sequence, strict: self.request.strict }
+    /// How INPUTs are taken: what is typed wins over the job.
+    fn taking<'t>(request: &'t Request, job: &'t JobFile) -> Taking<'t> {
+        Taking {
+            one_sequence: request.one_sequence,
+            strict: request.strict,
+            fps: request.fps.or(job.fps).unwrap_or(animation::FPS),
+            clip: request.clip.as_ref().unwrap_or(&job.clip),
+        }
     }
 
     /// A sequence of one layer: a picture for each of its files.
@@ -111,7 +117,8 @@ impl Resolving<'_> {
             let sources = vec![Source { layer: 0, file: Some(i), transform: None }];
             let settings = self.settings(job, file.number, &[&file.stem])?;
             let with = Fill { stem: &file.stem, name: of_job.unwrap_or(&files.name), frame: file.number };
-            let picture = picture_path(&settings, "{stem}", with)?;
+            let default = if file.moment.is_some() { "{stem}_{frame:04}" } else { "{stem}" };
+            let picture = picture_path(&settings, default, with)?;
             pictures.push(Picture { sequence, frame: file.number, sources, picture, settings });
         }
         self.add(files.name, vec![layer], pictures);
@@ -121,8 +128,9 @@ impl Resolving<'_> {
     /// All layers in one sequence: a picture for each frame of the job, else of the longest layer.
     fn add_layers(&mut self, job_name: &str, job: &JobFile) -> Result<(), JobError> {
         let mut layers = Vec::new();
+        let taking = Self::taking(self.request, job);
         for given in &job.layers {
-            let mut found = discover::discover(&given.sequence, self.taking(), &mut self.warnings)?;
+            let mut found = discover::discover(&given.sequence, taking, &mut self.warnings)?;
             if found.len() > 1 {
                 let text = format!(
                     "layer {} holds {} sequences; name one by a pattern",
@@ -306,7 +314,7 @@ mod tests {
     }
 
     fn shown(given: &LayerFile) -> Vec<Option<usize>> {
-        let file = |n| FrameFile { number: Some(n), path: PathBuf::new(), stem: String::new() };
+        let file = |n| FrameFile { number: Some(n), path: PathBuf::new(), stem: String::new(), moment: None };
         // frame 12 is missing
         let files = [file(10), file(11), file(13)];
         (-1..6).map(|offset| layer_file(&files, given, offset)).collect()

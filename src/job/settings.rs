@@ -147,10 +147,10 @@ impl Settings {
         }
     }
 
-    /// The camera at a frame, where it is given; None: auto. A number that a frame does not have counts as 0.
+    /// The camera at a frame, where it is given; None: auto, or one of a glTF. A number that a frame does not have counts as 0.
     pub fn camera_at(&self, frame: Option<i64>) -> Option<Camera> {
         match &self.camera {
-            CameraChoice::Auto => None,
+            CameraChoice::Auto | CameraChoice::Gltf { .. } => None,
             CameraChoice::Given(track) => track.at(frame.unwrap_or(0) as f64, self.up, self.fov_deg),
         }
     }
@@ -165,7 +165,10 @@ impl Settings {
 fn camera(o: &Options) -> Result<CameraChoice, String> {
     let mut choice = o.camera.clone().unwrap_or(CameraChoice::Auto);
     match &mut choice {
-        CameraChoice::Auto => match (o.eye, o.look_at) {
+        CameraChoice::Gltf { fov_deg, .. } if o.eye.or(o.look_at).is_none() => {
+            *fov_deg = o.fov.or(*fov_deg);
+        }
+        CameraChoice::Auto | CameraChoice::Gltf { .. } => match (o.eye, o.look_at) {
             (None, None) => return Ok(CameraChoice::Auto),
             (Some(eye), Some(look_at)) => {
                 let value = CameraPose { eye, look_at, up: None, fov_deg: None };

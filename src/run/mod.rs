@@ -1,6 +1,7 @@
 //! A run: reader, device and writer stages, threads joined by bounded queues. Reading frame n + 2, tracing n + 1 and
 //! encoding n overlap; memory is bounded by the queues' lengths. An error is a value that travels with its frame.
 
+mod animation;
 mod check;
 mod costs;
 pub mod event;

@@ -1,10 +1,11 @@
 //! What must be known of whole sequences before their first picture: auto cameras and auto lights.
 
 use super::RunOptions;
+use super::animation::Views;
 use super::read::read_options;
 use super::source::Sources;
-use crate::format;
-use crate::job::{Background, Job, LightChoice, Picture, Sequence, auto};
+use crate::format::{self, FormatError, Gltf};
+use crate::job::{Background, CameraChoice, FrameFile, Job, Layer, LightChoice, Picture, Sequence, auto};
 use crate::math::{Bounds, DVec3};
 use crate::scene::{self, Camera, Light, Object, Part, Shot, Texture};
 use crate::warning::Warnings;
@@ -40,27 +41,31 @@ pub(super) fn prepare(job: &Job, options: &RunOptions) -> Prepared {
         let pictures = || job.pictures.iter().filter(|p| p.sequence == i);
         let auto_light = pictures().any(|p| p.settings.lights == LightChoice::Auto);
         let auto_camera =
-            pictures().chain([&sequence.first]).any(|p| p.settings.camera_at(p.frame).is_none());
+            pictures().chain([&sequence.first]).any(|p| p.settings.camera == CameraChoice::Auto);
         if pictures().next().is_none() {
             continue;
         }
         if auto_camera {
-            prepared.sequences[i].bounds = Some(bounds(sequence, &mut prepared.warnings));
+            let bounds = bounds(sequence, &prepared.sources, &mut prepared.warnings);
+            prepared.sequences[i].bounds = Some(bounds);
         }
         if auto_light {
-            let camera = prepared.camera(&sequence.first);
-            let objects = first_objects(sequence, options, &prepared.sources);
-            prepared.sequences[i].light = Some(auto::light(&camera, auto::glow(&objects)));
+            let (objects, views) = first_objects(sequence, options, &prepared.sources);
+            // where there is no such camera the frames fail when their turn comes
+            if let Ok(camera) = prepared.camera(&sequence.first, &views) {
+                prepared.sequences[i].light = Some(auto::light(&camera, auto::glow(&objects)));
+            }
         }
     }
     prepared
 }
 
 impl Prepared {
-    /// The shot of a picture.
-    pub(super) fn shot(&self, picture: &Picture) -> Result<Shot, String> {
+    /// The shot of a picture in whose files those cameras and lights stand.
+    pub(super) fn shot(&self, picture: &Picture, views: &Views) -> Result<Shot, String> {
         let lights = match &picture.settings.lights {
             LightChoice::Given(lights) => lights.clone(),
+            LightChoice::Auto if !views.lights.is_empty() => views.lights.clone(),
             LightChoice::Auto => self.sequences[picture.sequence].light.into_iter().collect(),
         };
         let background = match &picture.settings.background {
@@ -74,15 +79,18 @@ impl Prepared {
                 }
             }
         };
-        Ok(picture.settings.shot(self.camera(picture), lights, background))
+        Ok(picture.settings.shot(self.camera(picture, views)?, lights, background))
     }
 
-    fn camera(&self, picture: &Picture) -> Camera {
+    fn camera(&self, picture: &Picture, views: &Views) -> Result<Camera, String> {
+        if let CameraChoice::Gltf { name, fov_deg } = &picture.settings.camera {
+            let mut camera = views.camera(name)?;
+            camera.fov_deg = fov_deg.unwrap_or(camera.fov_deg);
+            return Ok(camera);
+        }
         let bounds = || self.sequences[picture.sequence].bounds.unwrap_or(Bounds::EMPTY);
-        picture
-            .settings
-            .camera_at(picture.frame)
-            .unwrap_or_else(|| auto::camera(&bounds(), &picture.settings))
+        let given = picture.settings.camera_at(picture.frame);
+        Ok(given.unwrap_or_else(|| auto::camera(&bounds(), &picture.settings)))
     }
 }
 
@@ -100,11 +108,19 @@ fn backgrounds(job: &Job) -> HashMap<PathBuf, Result<Part<Texture>, String>> {
 
 /// The box of a sequence's layers over the frames that are looked at; files are scanned on all cores. What cannot be
 /// read is left out and said.
-fn bounds(sequence: &Sequence, warnings: &mut Warnings) -> Bounds {
-    let files: Vec<_> =
-        sequence.layers.iter().flat_map(|l| auto::scanned(l).map(move |i| (l, &l.files[i]))).collect();
-    let boxes: Vec<_> =
-        files.par_iter().map(|(layer, file)| (*layer, file, format::scan_bounds(&file.path))).collect();
+fn bounds(sequence: &Sequence, sources: &Sources, warnings: &mut Warnings) -> Bounds {
+    // opening decodes textures on rayon's pool, which must not be done from within it
+    let animations: Vec<_> = sequence.layers.iter().map(|l| animation(sequence, l, sources)).collect();
+    let files: Vec<_> = sequence
+        .layers
+        .iter()
+        .zip(&animations)
+        .flat_map(|(l, a)| auto::scanned(l).map(move |i| (l, a, &l.files[i])))
+        .collect();
+    let boxes: Vec<_> = files
+        .par_iter()
+        .map(|(layer, animation, file)| (*layer, file, file_bounds(file, animation.as_ref())))
+        .collect();
     let mut all = Bounds::EMPTY;
     for (layer, file, bounds) in boxes {
         match bounds {
@@ -117,17 +133,40 @@ fn bounds(sequence: &Sequence, warnings: &mut Warnings) -> Bounds {
     all
 }
 
+/// The glTF file of a layer, where it is one and can be opened.
+fn animation(sequence: &Sequence, layer: &Layer, sources: &Sources) -> Option<Arc<Gltf>> {
+    let file = layer.files.first().filter(|file| file.moment.is_some())?;
+    let read = read_options(&sequence.first, layer.materials.as_deref(), false);
+    sources.animations.open(&file.path, &read, false).ok().map(|(gltf, _)| gltf)
+}
+
+fn file_bounds(file: &FrameFile, animation: Option<&Arc<Gltf>>) -> Result<Bounds, FormatError> {
+    match (&file.moment, animation) {
+        (None, _) => format::scan_bounds(&file.path),
+        (Some(moment), Some(gltf)) => gltf.bounds(moment.time_s, &moment.clip),
+        // why it cannot be opened is told when its frames fail
+        (Some(_), None) => Ok(Bounds::EMPTY),
+    }
+}
+
 /// What stands in a sequence's first picture; layers that cannot be read are left out (their frames fail when their
 /// turn comes).
-fn first_objects(sequence: &Sequence, options: &RunOptions, sources: &Sources) -> Vec<Object> {
-    let mut objects = Vec::new();
+fn first_objects(sequence: &Sequence, options: &RunOptions, sources: &Sources) -> (Vec<Object>, Views) {
+    let (mut objects, mut views) = (Vec::new(), Views::default());
     for source in &sequence.first.sources {
         let layer = &sequence.layers[source.layer];
         let Some(file) = source.file.map(|i| &layer.files[i]) else { continue };
         let read = read_options(&sequence.first, layer.materials.as_deref(), options.lenient);
-        if let Ok(loaded) = sources.ahead(&file.path, &read) {
+        if let Some(moment) = &file.moment {
+            let layer = source.transform.as_ref();
+            if let Ok(shown) = sources.animations.show(&file.path, moment, &read, layer, false) {
+                objects.extend(shown.objects);
+                views.cameras.extend(shown.views.cameras);
+                views.lights.extend(shown.views.lights);
+            }
+        } else if let Ok(loaded) = sources.ahead(&file.path, &read) {
             objects.push(Object { geometry: Arc::clone(&loaded.geometry), transform: source.transform });
         }
     }
-    objects
+    (objects, views)
 }

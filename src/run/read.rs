@@ -1,5 +1,6 @@
 //! The reader stage: files become a frame and a shot, and finished pictures are recognised before they are traced.
 
+use super::animation::{self, Views};
 use super::event::{ByteCounts, FrameReport, StageTimes, Status, UpdateReport};
 use super::memory::{InFlight, expected_bytes, needed_bytes, refusal};
 use super::prepare::Prepared;
@@ -103,12 +104,12 @@ impl<'a> Reader<'a> {
         let sources = &self.prepared.sources;
         let loaded =
             load_frame(self.job, picture, sources, self.options.lenient, self.options.strict, warnings);
-        let frame = match loaded {
+        let (frame, views) = match loaded {
             Ok(loaded) => {
                 report.bytes.read = loaded.bytes_read;
                 report.ms.read = Some(loaded.read_ms);
                 report.ms.parse = Some(loaded.parse_ms);
-                loaded.frame
+                (loaded.frame, loaded.views)
             }
             Err(error) => {
                 report.device_failed = matches!(error, LoadError::TooLarge(_));
@@ -118,7 +119,7 @@ impl<'a> Reader<'a> {
         };
         report.triangles = frame.triangles();
         self.refuse_beyond_memory(&mut report, needed_bytes(&frame))?;
-        let shot = match self.prepared.shot(picture) {
+        let shot = match self.prepared.shot(picture, &views) {
             Ok(shot) => shot,
             Err(error) => {
                 report.error = Some(error);
@@ -190,6 +191,7 @@ impl<'a> Reader<'a> {
 /// A frame and what reading it cost; what was kept from an earlier frame costs nothing.
 struct LoadedFrame {
     frame: Frame,
+    views: Views,
     bytes_read: u64,
     read_ms: f64,
     parse_ms: f64,
@@ -231,13 +233,34 @@ fn load_frame(
     warnings: &mut Warnings,
 ) -> Result<LoadedFrame, LoadError> {
     let sequence = &job.sequences[picture.sequence];
-    let mut all = LoadedFrame { frame: Frame::default(), bytes_read: 0, read_ms: 0.0, parse_ms: 0.0 };
+    let mut all = LoadedFrame {
+        frame: Frame::default(),
+        views: Views::default(),
+        bytes_read: 0,
+        read_ms: 0.0,
+        parse_ms: 0.0,
+    };
     for source in &picture.sources {
         let Some(file) = source.file else { continue };
         let layer = &sequence.layers[source.layer];
         let still = layer.files.len() == 1 && job.pictures.len() > 1;
         let options = read_options(picture, layer.materials.as_deref(), lenient);
         let path = &layer.files[file].path;
+        if let Some(moment) = &layer.files[file].moment {
+            let shown = sources.animations.show(path, moment, &options, source.transform.as_ref(), true)?;
+            if shown.is_first {
+                all.bytes_read += shown.gltf.bytes_read;
+                animation::tell(&shown.gltf, path, &options, warnings);
+            }
+            if strict && let Some(missing) = shown.gltf.missing.first() {
+                return Err(LoadError::Bad(format!("{missing}; the frame is not rendered (--strict)")));
+            }
+            all.parse_ms += shown.parse_ms;
+            all.views.cameras.extend(shown.views.cameras);
+            all.views.lights.extend(shown.views.lights);
+            all.frame.objects.extend(shown.objects);
+            continue;
+        }
         let (loaded, first) = sources.load(path, &options, still)?;
         if first {
             all.bytes_read += loaded.bytes_read;

@@ -1,5 +1,6 @@
 //! Loaded files of a run: what stands in more than one picture is parsed once.
 
+use super::animation::Animations;
 use crate::clock::FileTime;
 use crate::format::{self, FormatError, Loaded, ReadOptions, TextureCache};
 use crate::store::Store;
@@ -8,11 +9,16 @@ use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 
 /// A file's state as the system tells it: size and time of change.
-type Stamp = (u64, Option<FileTime>);
+pub(super) type Stamp = (u64, Option<FileTime>);
 
 /// How long a file is; 0 where the system does not tell.
 pub(super) fn file_bytes(path: &Path) -> u64 {
     std::fs::metadata(path).map_or(0, |m| m.len())
+}
+
+/// A file's state.
+pub(super) fn stamp(path: &Path) -> Stamp {
+    std::fs::metadata(path).map(|m| (m.len(), m.modified().ok())).unwrap_or_default()
 }
 
 struct Kept {
@@ -29,12 +35,17 @@ struct Kept {
 pub struct Sources {
     kept: Mutex<HashMap<PathBuf, Kept>>,
     textures: TextureCache,
+    pub(super) animations: Animations,
 }
 
 impl Sources {
     /// With a limit on the bytes that one frame's textures may take together, and a store.
     pub(super) fn new(texture_bytes: Option<u64>, store: Option<Arc<Store>>) -> Self {
-        Self { textures: TextureCache::new(texture_bytes, store), ..Self::default() }
+        Self {
+            textures: TextureCache::new(texture_bytes, store),
+            animations: Animations::with_limit(texture_bytes),
+            ..Self::default()
+        }
     }
 
     /// Loads an OBJ before its picture's turn and keeps it until then.
@@ -60,7 +71,7 @@ impl Sources {
         keep: bool,
         uses: bool,
     ) -> Result<(Arc<Loaded>, bool), FormatError> {
-        let stamp = std::fs::metadata(path).map(|m| (m.len(), m.modified().ok())).unwrap_or_default();
+        let stamp = stamp(path);
         {
             let mut kept = self.kept.lock().unwrap_or_else(PoisonError::into_inner);
             if let Some(k) = kept.get_mut(path).filter(|k| k.stamp == stamp && k.options == *options) {

@@ -50,13 +50,13 @@ pub(super) fn decode(bytes: &[u8], path: &Path, room: &Room) -> Result<Picture, 
 
 /// Memory that pictures decoded at the same time share.
 #[derive(Debug)]
-pub(super) struct Room {
+pub(in crate::format) struct Room {
     limit_bytes: u64,
     taken_bytes: AtomicU64,
 }
 
 impl Room {
-    pub(super) fn new(limit_bytes: u64) -> Self {
+    pub(in crate::format) fn new(limit_bytes: u64) -> Self {
         Self { limit_bytes, taken_bytes: AtomicU64::new(0) }
     }
 
@@ -66,7 +66,7 @@ impl Room {
     }
 
     /// Bytes that were wanted, where they are more than there are.
-    pub(super) fn exceeded(&self) -> Option<u64> {
+    pub(in crate::format) fn exceeded(&self) -> Option<u64> {
         Some(self.taken_bytes.load(Ordering::Relaxed)).filter(|taken| *taken > self.limit_bytes)
     }
 

@@ -9,7 +9,8 @@ use super::text;
 use crate::clock::FileTime;
 use crate::scene::{Part, TexelSpace, Texels, Texture};
 use crate::store::Store;
-use decode::{Picture, Room};
+use decode::Picture;
+pub(super) use decode::Room;
 use rayon::prelude::*;
 use std::collections::{HashMap, HashSet};
 use std::fs;
@@ -163,18 +164,34 @@ fn decoded(
         room.take(part.bytes());
         return Ok(part);
     }
-    // decoders are other people's code: what they do on broken files must not end the run
-    let picture = catch_unwind(AssertUnwindSafe(|| decode::decode(&bytes, path, room)))
-        .unwrap_or_else(|_| Err("is broken, its decoder gave up on it".to_owned()));
-    picture
-        .map(|picture| {
-            let texture = texture(picture, texture_use);
+    decoded_from_bytes(&bytes, path, texture_use, room)
+        .inspect(|texture| {
             if let Some((store, key)) = stored {
-                stored::put(store, key, &texture);
+                stored::put(store, key, texture);
             }
-            Part::new(texture)
         })
         .map_err(|cause| FormatError::BadPicture { path: path.to_path_buf(), cause })
+}
+
+/// Decodes a picture in memory, known by its first bytes, or by a file's name where those say nothing. An error is
+/// what is wrong with it. The memory for its texels is taken from the room first.
+pub(super) fn decoded_from_bytes(
+    bytes: &[u8],
+    name: &Path,
+    texture_use: TextureUse,
+    room: &Room,
+) -> Result<Part<Texture>, String> {
+    // decoders are other people's code: what they do on broken files must not end the run
+    let picture = catch_unwind(AssertUnwindSafe(|| decode::decode(bytes, name, room)))
+        .unwrap_or_else(|_| Err("is broken, its decoder gave up on it".to_owned()));
+    picture.map(|picture| Part::new(texture(picture, texture_use)))
+}
+
+/// A texture of shares of 255, one a texel, row by row from the top, with its mip levels. There must be as many as
+/// the size says.
+pub(super) fn share_texture(size: [u32; 2], shares: impl Iterator<Item = u8>) -> Texture {
+    let texels = decode::Level::U8(shares.map(|share| [share, share, share, 255]).collect());
+    texture(Picture { size, texels }, TextureUse::Data)
 }
 
 /// Makes a texture of decoded texels. 8-bit ones stay what they are; finer integers become floats, colours through the

@@ -11,6 +11,7 @@ use super::pattern::Pattern;
 use super::settings::{self, FILTERS, MTL_COLORS};
 use super::track::Placed;
 use super::words::one_of;
+use crate::format::ClipChoice;
 use crate::scene::AovSet;
 use fields::{Fields, Read, color, frames, list, number, parsed, text, truth, unexpected, whole};
 use node::{Node, Value, Wrong};
@@ -25,6 +26,8 @@ pub(super) struct JobFile {
     pub(super) layers: Vec<LayerFile>,
     pub(super) frames: Option<FrameSet>,
     pub(super) folder: Option<PathBuf>,
+    pub(super) fps: Option<f64>,
+    pub(super) clip: ClipChoice,
     pub(super) options: Options,
     pub(super) overrides: Vec<Override>,
 }
@@ -118,10 +121,8 @@ fn parse(yaml: &str, said_in: &Path) -> Read<JobFile> {
         Value::Number(1.0) => Ok(()),
         _ => Err(Wrong::at(node, "this version of rentix reads job files of version 1")),
     })?;
-    // those two are for the daemon and for glTF; here they are only checked
+    // that is for the daemon; here it is only checked
     job.get("priority", whole(limits::FRAME))?;
-    job.get("fps", number(limits::FPS))?;
-    job.get("clip", text)?;
 
     match (job.node("sequence"), job.node("layers")) {
         (None, None) => return Err(Wrong::at(&root, "a job needs either `sequence` or `layers`")),
@@ -136,6 +137,8 @@ fn parse(yaml: &str, said_in: &Path) -> Read<JobFile> {
         sequence: job.get("sequence", path)?,
         layers: job.get("layers", |node| layers(node, said_in))?.unwrap_or_default(),
         frames: job.get("frames", frames)?,
+        fps: job.get("fps", number(limits::FPS))?,
+        clip: job.get("clip", text)?.map(|word| ClipChoice::from_word(&word)).unwrap_or_default(),
         options: scene_options(&job, said_in)?,
         overrides: job.get("overrides", list(|node| override_of(node, said_in)))?.unwrap_or_default(),
         folder: None,

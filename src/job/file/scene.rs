@@ -29,7 +29,14 @@ pub(super) fn camera(node: &Node, options: &mut Options) -> Read<CameraChoice> {
     }
     let map = Fields::of(node, &[&["eye", "look_at", "up", "fov", "keys", "interpolate", "gltf"]])?;
     if let Some(gltf) = map.node("gltf") {
-        return Err(Wrong::at(gltf, "glTF cameras are not supported by this version"));
+        if let Some((other, _)) =
+            entries(node)?.iter().find(|(key, _)| key.value != "gltf" && key.value != "fov")
+        {
+            let text = format!("a glTF camera has no `{}` of its own; remove it", other.value);
+            return Err(Wrong::at(other, text));
+        }
+        let fov_deg = map.get("fov", number(limits::FOV))?;
+        return Ok(CameraChoice::Gltf { name: text(gltf)?, fov_deg });
     }
     let (up, fov_deg) = (map.get("up", up)?, map.get("fov", number(limits::FOV))?);
     let interpolation = map.get("interpolate", parsed(|w| one_of(&INTERPOLATIONS, w)))?.unwrap_or_default();
