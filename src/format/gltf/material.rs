@@ -11,9 +11,9 @@
 //! | alphaMode OPAQUE, MASK, BLEND | d 1; d and `map_d` 0 or 1 by the cutoff; d and `map_d` alpha |
 //! | unlit | illum 0, Kd = b |
 //! | normalTexture | norm |
-//! | `KHR_texture_transform` | scale and offset of the map |
+//! | `KHR_texture_transform` | scale and offset of the map; where all textures of a material are turned alike, texture coordinates are |
 //!
-//! What has no word is named once: rotated textures, `normalTexture.scale`, occlusion, texture coordinates other than
+//! What has no word is named once: textures of one material that are turned differently, `normalTexture.scale`, occlusion, texture coordinates other than
 //! the first. Without effect are doubleSided (all surfaces have two sides) and the filters of samplers (ours are
 //! trilinear).
 
@@ -28,7 +28,7 @@ use crate::scene::{Channel, Map, Material, Part, TexelSpace, Texels, Texture};
 use crate::warning::Warnings;
 use gltf::json::Index;
 use gltf::json::extensions::texture::TextureTransform;
-use gltf::json::material::AlphaMode;
+use gltf::json::material::{AlphaMode, NormalTexture};
 use gltf::json::texture::{Info, WrappingMode};
 use gltf::json::validation::Checked;
 use std::collections::HashMap;
@@ -68,7 +68,8 @@ impl Materials {
             .materials
             .get(index)
             .ok_or_else(|| Cause::broken(format!("material {index} is named and is not there")))?;
-        let mut maps = Maps { file, pictures: &mut self.pictures, warnings };
+        let mut maps =
+            Maps { turned: turn_of(given).is_some(), file, pictures: &mut self.pictures, warnings };
         let mut made = material(given, &mut maps)?;
         let name = given.name.as_deref().unwrap_or_default();
         if let Some(overlay) = self.overlays.get(name.as_bytes()) {
@@ -83,8 +84,39 @@ impl Materials {
     }
 }
 
+/// The transform that all textures of a material have, where it turns them: texture coordinates take it, since maps
+/// cannot turn.
+pub(super) fn turn(file: &File, index: usize) -> Option<TextureTransform> {
+    turn_of(file.root.materials.get(index)?)
+}
+
+fn turn_of(given: &gltf::json::Material) -> Option<TextureTransform> {
+    let pbr = &given.pbr_metallic_roughness;
+    let transmission = given.extensions.as_ref().and_then(|e| e.transmission.as_ref());
+    let infos = [
+        pbr.base_color_texture.as_ref(),
+        pbr.metallic_roughness_texture.as_ref(),
+        given.emissive_texture.as_ref(),
+        transmission.and_then(|t| t.transmission_texture.as_ref()),
+    ];
+    let own = |info: &Info| info.extensions.as_ref().and_then(|e| e.texture_transform.clone());
+    let of_normal = given.normal_texture.as_ref().map(normal_transform);
+    let mut all = infos.into_iter().flatten().map(own).chain(of_normal);
+    let first = all.next()?.filter(|t| t.rotation.0 != 0.0)?;
+    let numbers = |t: &TextureTransform| (t.offset.0, t.rotation.0, t.scale.0);
+    all.all(|t| t.is_some_and(|t| numbers(&t) == numbers(&first))).then_some(first)
+}
+
+fn normal_transform(normal: &NormalTexture) -> Option<TextureTransform> {
+    let given = normal.extensions.as_ref()?.others.get("KHR_texture_transform")?.clone();
+    // what is no transform is none
+    gltf::json::deserialize::from_value(given).ok()
+}
+
 /// Finds the maps of a material.
 struct Maps<'a> {
+    /// Whether texture coordinates are turned already.
+    turned: bool,
     file: &'a File,
     pictures: &'a mut Pictures,
     warnings: &'a mut Warnings,
@@ -137,9 +169,9 @@ impl Maps<'_> {
             return Ok(None);
         };
         let (mut scale, mut offset) = ([1.0; 2], [0.0; 2]);
-        if let Some(transform) = transform {
+        if let Some(transform) = transform.filter(|_| !self.turned) {
             if transform.rotation.0 != 0.0 {
-                self.warn("the rotation of a texture (KHR_texture_transform) is not mapped");
+                self.warn("a texture that is turned (KHR_texture_transform) beside others that are not is not turned");
             }
             scale = transform.scale.0;
             // with v' = 1 − v: 1 − (v·s + o) = v'·s + (1 − s − o)
@@ -207,11 +239,7 @@ fn material(given: &gltf::json::Material, maps: &mut Maps<'_>) -> Result<Materia
         made.textures.map_ke = maps.of(given.emissive_texture.as_ref(), TextureUse::Color)?;
     }
     if let Some(normal) = &given.normal_texture {
-        let others = normal.extensions.as_ref().map(|e| &e.others);
-        let transform = others.and_then(|o| o.get("KHR_texture_transform")).cloned();
-        // what is no transform is none
-        let transform =
-            transform.and_then(|t| gltf::json::deserialize::from_value::<TextureTransform>(t).ok());
+        let transform = normal_transform(normal);
         if normal.scale != 1.0 {
             maps.warn("the scale of a normal texture is not mapped");
         }
@@ -403,9 +431,16 @@ mod tests {
         let map = m.textures.map_kd.unwrap();
         // v' = 1 − v; v = 0 goes to 0.5, that is 0.5; v = 1 to 4.5, that is −3.5: 4·v' − 3.5
         assert_eq!((map.scale, map.offset, map.clamp, said.len()), ([2.0, 4.0], [0.25, -3.5], true, 0));
-        let (m, said) = with(r#"{"index":2,"extensions":{"KHR_texture_transform":{"rotation":1}}}"#);
-        assert!(m.textures.map_kd.is_some_and(|map| !map.clamp));
-        assert_eq!(said.len(), 2, "{said:?}");
+        // turned texture coordinates need no other map
+        let (m, said) =
+            with(r#"{"index":2,"extensions":{"KHR_texture_transform":{"rotation":1,"scale":[2,2]}}}"#);
+        assert!(m.textures.map_kd.is_some_and(|map| !map.clamp && map.scale == [1.0; 2]));
+        assert_eq!(said.len(), 1, "{said:?}");
+        let (_, said) = made(
+            r#"{"emissiveTexture":{"index":0},"emissiveFactor":[1,1,1],"pbrMetallicRoughness":{"metallicFactor":0,
+            "baseColorTexture":{"index":0,"extensions":{"KHR_texture_transform":{"rotation":1}}}}}"#,
+        );
+        assert_eq!(said.len(), 1, "{said:?}");
         let (m, said) = with(r#"{"index":0,"texCoord":1}"#);
         assert_eq!((m.textures.map_kd, said.len()), (None, 1));
         let (m, said) = made(r#"{"pbrMetallicRoughness":{"metallicRoughnessTexture":{"index":0}}}"#);

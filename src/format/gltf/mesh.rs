@@ -1,7 +1,7 @@
 //! Meshes: the primitives of one become one [`Geometry`].
 
 use super::file::File;
-use super::material::Materials;
+use super::material::{self, Materials};
 use super::{Cause, accessor};
 use crate::math::srgb_from_linear;
 use crate::scene::normals::{self, Smoothing};
@@ -12,6 +12,7 @@ use crate::scene::{
 use crate::warning::Warnings;
 use gltf::json;
 use gltf::json::accessor::Type;
+use gltf::json::extensions::texture::TextureTransform;
 use gltf::json::mesh::{Mode, Primitive, Semantic};
 use gltf::json::validation::Checked;
 use std::collections::HashMap;
@@ -168,10 +169,8 @@ impl Growing {
         append(&mut self.normals, given, first, count, [0.0; 3]);
 
         let given = attribute(Semantic::TexCoords(0)).map(|i| vertex_list(i, &[Type::Vec2])).transpose()?;
-        // our v runs up
-        let given = given.map(|t| {
-            t.values.as_chunks::<2>().0.iter().map(|&[u, v]| [u as f32, (1.0 - v) as f32]).collect::<Vec<_>>()
-        });
+        let turn = primitive.material.and_then(|index| material::turn(file, index.value()));
+        let given = given.map(|t| texcoords(&t, turn.as_ref()));
         self.texcoord_corners.extend(corners(&triangles, given.is_some(), |corner| {
             given.as_ref().is_some_and(|t| t[corner as usize - first].iter().all(|x| x.is_finite()))
         }));
@@ -359,6 +358,20 @@ fn corners(triangles: &[[u32; 3]], given: bool, is_usable: impl Fn(u32) -> bool)
     triangles.iter().map(|triangle| triangle.map(own)).collect()
 }
 
+/// Texture coordinates, turned where all maps are (KHR_texture_transform: scale, rotation, offset), v running up.
+fn texcoords(given: &accessor::Numbers, turn: Option<&TextureTransform>) -> Vec<[f32; 2]> {
+    let angle = turn.map_or(0.0, |turn| f64::from(turn.rotation.0));
+    let (sine, cosine) = (libm::sin(angle), libm::cos(angle));
+    let [su, sv] = turn.map_or([1.0; 2], |turn| turn.scale.0.map(f64::from));
+    let [ou, ov] = turn.map_or([0.0; 2], |turn| turn.offset.0.map(f64::from));
+    let turned = |&[u, v]: &[f64; 2]| {
+        let (u, v) = (u * su, v * sv);
+        [cosine * u + sine * v + ou, cosine * v - sine * u + ov]
+    };
+    let pairs = given.values.as_chunks::<2>().0.iter();
+    pairs.map(turned).map(|[u, v]| [u as f32, (1.0 - v) as f32]).collect()
+}
+
 /// Triangles of a list, a strip or a fan (glTF 2.0, 3.7.2.1), moved by `first`.
 fn triangles(list: &[u32], mode: Mode, first: u32) -> Vec<[u32; 3]> {
     let at = |i: usize| list[i] + first;
@@ -383,6 +396,21 @@ mod tests {
         for mode in [Mode::Triangles, Mode::TriangleStrip, Mode::TriangleFan] {
             assert!(triangles(&[1, 2], mode, 0).is_empty());
         }
+    }
+
+    #[test]
+    fn texture_coordinates_turn() {
+        // (1, 0) twice as large, a quarter turn, moved: (cos · 2 + 0.5, −sin · 2 + 0.25), and 1 − v
+        let turn = TextureTransform {
+            rotation: json::extensions::texture::TextureTransformRotation(std::f32::consts::FRAC_PI_2),
+            scale: json::extensions::texture::TextureTransformScale([2.0, 2.0]),
+            offset: json::extensions::texture::TextureTransformOffset([0.5, 0.25]),
+            ..TextureTransform::default()
+        };
+        let given = accessor::Numbers { width: 2, values: vec![1.0, 0.0] };
+        let [u, v] = texcoords(&given, Some(&turn))[0];
+        assert!((u - 0.5).abs() < 1e-6 && (v - 2.75).abs() < 1e-6, "{u} {v}");
+        assert_eq!(texcoords(&given, None), [[1.0, 1.0]]);
     }
 
     #[test]
