@@ -9,6 +9,7 @@ mod number;
 mod obj;
 mod text;
 mod texture;
+mod triple;
 
 use crate::clock::Stopwatch;
 use crate::math::Bounds;

@@ -1,13 +1,16 @@
 //! Loaded files of a run: what stands in more than one picture is parsed once.
 
 use crate::clock::FileTime;
-use crate::format::{self, FormatError, Loaded, ReadOptions, TextureCache};
+use crate::format::{self, FormatError, Loaded, Parsed, ReadOptions, TextureCache};
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 
 /// A file's state as the system tells it: size and time of change.
 type Stamp = (u64, Option<FileTime>);
+
+/// So many layers have a frame kept to read the next by.
+const MAX_LAYERS: usize = 16;
 
 /// How long a file is; 0 where the system does not tell.
 pub(super) fn file_bytes(path: &Path) -> u64 {
@@ -28,6 +31,8 @@ struct Kept {
 pub struct Sources {
     kept: Mutex<HashMap<PathBuf, Kept>>,
     textures: TextureCache,
+    /// Of each layer the frame that was read last, as its text; the layer read last stands last.
+    latest: Mutex<Vec<(PathBuf, Arc<Parsed>)>>,
 }
 
 impl Sources {
@@ -71,11 +76,39 @@ impl Sources {
                 return Ok(found);
             }
         }
-        let loaded = Arc::new(format::load_obj(path, options, &self.textures)?);
+        let layer = without_numbers(path);
+        let before = self.before(&layer);
+        let (loaded, parsed) = format::load_obj_after(before.as_deref(), path, options, &self.textures)?;
+        if let Some(parsed) = parsed {
+            self.keep_latest(layer, parsed);
+        }
+        let loaded = Arc::new(loaded);
         if keep {
             let entry = Kept { stamp, options: options.clone(), loaded: Arc::clone(&loaded), used: uses };
             self.kept.lock().unwrap_or_else(PoisonError::into_inner).insert(path.to_path_buf(), entry);
         }
         Ok((loaded, true))
     }
+
+    /// The frame of a layer that was read last. Which one it is depends on the readers' pace; what is read by it does
+    /// not.
+    fn before(&self, layer: &Path) -> Option<Arc<Parsed>> {
+        let latest = self.latest.lock().unwrap_or_else(PoisonError::into_inner);
+        latest.iter().find(|(known, _)| known == layer).map(|(_, parsed)| Arc::clone(parsed))
+    }
+
+    fn keep_latest(&self, layer: PathBuf, parsed: Parsed) {
+        let mut latest = self.latest.lock().unwrap_or_else(PoisonError::into_inner);
+        latest.retain(|(known, _)| *known != layer);
+        if latest.len() >= MAX_LAYERS {
+            latest.remove(0);
+        }
+        latest.push((layer, Arc::new(parsed)));
+    }
+}
+
+/// What the files of a layer have in common.
+fn without_numbers(path: &Path) -> PathBuf {
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    path.with_file_name(name.replace(|c: char| c.is_ascii_digit(), ""))
 }
