@@ -5,59 +5,75 @@
 use super::number::{INTEGER_POWERS, INVERSE_POWERS, eight_digits, near_halfway};
 
 /// Bytes in which the numbers must stand, with what ends them.
-const WINDOW: usize = 64;
+const WINDOW: usize = 48;
+/// Eight bytes before the numbers too, so that eight bytes can be taken that end with any digit.
+const BEFORE: usize = 8;
+/// All bytes looked at; beyond the window no byte is more than there.
+const BYTES: usize = 72;
 
 /// The three numbers at `at`, one blank between them and a line end behind them, and where the next line begins. None
 /// where they are not so, or not surely exact, or too near to an end of the text.
 #[inline]
 pub(super) fn triple(text: &[u8], at: usize) -> Option<([f32; 3], usize)> {
-    // eight bytes before the numbers too, so that eight bytes can be taken that end with any digit
-    let window: &[u8; 8 + WINDOW] = text.get(at.checked_sub(8)?..)?.first_chunk()?;
-    let mut others = others(window);
-    let mut values = [0.0; 3];
-    let mut start = 0;
-    let mut sound = true;
-    for (k, value) in values.iter_mut().enumerate() {
-        let signed = usize::from(*window.get(8 + start)? == b'-');
-        others &= !((signed as u64) << start);
-        let point = others.trailing_zeros() as usize;
-        others &= others.wrapping_sub(1);
-        let end = others.trailing_zeros() as usize;
-        others &= others.wrapping_sub(1);
-        let (digits, decimals) = (point.wrapping_sub(start + signed), end.wrapping_sub(point + 1));
-        if digits > 7 || decimals.wrapping_sub(1) > 7 || end == WINDOW {
-            return None;
-        }
-        sound &= window[8 + point] == b'.' && (k == 2 || window[8 + end] == b' ');
-        // the eight bytes that end with the last digit, with the one before that, with the point
-        let eight = |from: usize| Some(u64::from_le_bytes(*window.get(from..)?.first_chunk()?) ^ ZEROS);
-        let behind = eight(end)?;
-        let mantissa = if digits + decimals <= 8 {
-            // the point taken out
-            let before = eight(end - 1)? & last(digits + decimals);
-            let of_decimals = last(decimals);
-            eight_digits(behind & of_decimals | before & !of_decimals)
-        } else {
-            // at least one digit, since there are at most eight decimals
-            eight_digits(eight(point)? & last(digits)) * INTEGER_POWERS[decimals]
-                + eight_digits(behind & last(decimals))
-        };
-        let scaled = mantissa as i64 as f64 * INVERSE_POWERS[decimals];
-        sound &= !near_halfway(scaled);
-        *value = f32::from_bits((scaled as f32).to_bits() | (signed as u32) << 31);
-        start = end + 1;
+    let bytes: &[u8; BYTES] = text.get(at.checked_sub(BEFORE)?..)?.first_chunk()?;
+    let Marks { others, points, ends } = marks(bytes);
+    let (points, ends) = (first_three(points), first_three(ends));
+    if ends[2] >= WINDOW || points[2] >= ends[2] {
+        return None;
     }
-    let end = start - 1;
-    let length = match window[8 + end] {
-        b'\n' => 1,
-        b'\r' if window.get(8 + start) == Some(&b'\n') => 2,
+    let starts = [0, ends[0] + 1, ends[1] + 1];
+    let signs = starts.map(|start| u64::from(bytes[BEFORE + (start & 63)] == b'-'));
+    let signed = |k: usize| signs[k] as usize;
+    // wrong orders become large numbers
+    let digits: [usize; 3] = std::array::from_fn(|k| points[k].wrapping_sub(starts[k] + signed(k)));
+    let decimals: [usize; 3] = std::array::from_fn(|k| ends[k].wrapping_sub(points[k] + 1));
+    let few = (digits[0] | digits[1] | digits[2]) < 8;
+    let some = decimals.iter().fold(0, |all, count| all | count.wrapping_sub(1)) < 8;
+    let expected = (0..3).fold(0, |all, k| all | 1 << points[k] | 1 << ends[k] | signs[k] << starts[k]);
+    let between = bytes[BEFORE + (ends[0] & 63)] == b' ' && bytes[BEFORE + (ends[1] & 63)] == b' ';
+    if !(few && some && between && others & ((2 << ends[2]) - 1) == expected) {
+        return None;
+    }
+    let length = match (bytes[BEFORE + (ends[2] & 63)], bytes[BEFORE + ((ends[2] + 1) & 63)]) {
+        (b'\n', _) => 1,
+        (b'\r', b'\n') => 2,
         _ => return None,
     };
-    sound.then_some((values, at + end + length))
+    // the eight bytes before this place, as digits
+    let eight = |place: usize| {
+        let eight = bytes[place & 63..].first_chunk().copied().unwrap_or_default();
+        u64::from_le_bytes(eight) ^ 0x3030_3030_3030_3030
+    };
+    let is_short = (0..3).all(|k| digits[k] + decimals[k] <= 8);
+    let mut is_exact = true;
+    let values = std::array::from_fn(|k| {
+        let of_decimals = last(decimals[k]);
+        let behind = eight(ends[k]) & of_decimals;
+        let mantissa = if is_short {
+            // the point taken out
+            let before = eight(ends[k] - 1) & last(digits[k] + decimals[k]) & !of_decimals;
+            eight_digits(behind | before)
+        } else {
+            // in two steps: there may be no digit, and a shift by 64 is none
+            let whole = eight(points[k]) & (last(digits[k] + 1) << 8);
+            eight_digits(whole) * INTEGER_POWERS[decimals[k]] + eight_digits(behind)
+        };
+        let scaled = mantissa as i64 as f64 * INVERSE_POWERS[decimals[k]];
+        is_exact &= !near_halfway(scaled);
+        f32::from_bits((scaled as f32).to_bits() | (signs[k] as u32) << 31)
+    });
+    is_exact.then_some((values, at + ends[2] + length))
 }
 
-/// `0` in each byte.
-const ZEROS: u64 = 0x3030_3030_3030_3030;
+/// The places of the lowest three bits; 64 where there are fewer.
+#[inline]
+fn first_three(mut bits: u64) -> [usize; 3] {
+    std::array::from_fn(|_| {
+        let place = bits.trailing_zeros() as usize;
+        bits &= bits.wrapping_sub(1);
+        place
+    })
+}
 
 /// The last `count` bytes of eight, 1 to 8.
 #[inline]
@@ -65,36 +81,61 @@ fn last(count: usize) -> u64 {
     u64::MAX << ((64 - 8 * count) & 63)
 }
 
-/// A bit for each byte behind the first eight, set where it is no digit.
-#[inline]
-#[cfg(target_arch = "x86_64")]
-fn others(window: &[u8; 8 + WINDOW]) -> u64 {
-    use std::arch::x86_64::{__m128i, _mm_add_epi8, _mm_cmpgt_epi8, _mm_movemask_epi8, _mm_set1_epi8};
-    let mut bits = 0;
-    for (k, bytes) in window[8..].as_chunks::<16>().0.iter().enumerate() {
-        let bytes: __m128i = bytemuck::cast(*bytes);
-        // SAFETY: these take values, no pointers, and need SSE2 alone, which every x86-64 has.
-        let of_bytes = unsafe {
-            // digits become the ten least of all signed bytes
-            let moved = _mm_add_epi8(bytes, _mm_set1_epi8((0x80 - b'0') as i8));
-            _mm_movemask_epi8(_mm_cmpgt_epi8(moved, _mm_set1_epi8(i8::MIN + 9)))
-        };
-        bits |= u64::from(of_bytes as u16) << (16 * k);
-    }
-    bits
+/// A bit for each byte of the window.
+#[derive(Debug, PartialEq)]
+struct Marks {
+    /// What is no digit.
+    others: u64,
+    /// Points.
+    points: u64,
+    /// Blanks, line ends and other bytes that are no characters of ASCII.
+    ends: u64,
 }
 
-/// A bit for each byte behind the first eight, set where it is no digit.
+#[inline]
+#[cfg(target_arch = "x86_64")]
+fn marks(bytes: &[u8; BYTES]) -> Marks {
+    use std::arch::x86_64::{
+        __m128i, _mm_add_epi8, _mm_cmpeq_epi8, _mm_cmpgt_epi8, _mm_movemask_epi8, _mm_set1_epi8,
+    };
+    let mut marks = Marks { others: 0, points: 0, ends: 0 };
+    for (k, chunk) in bytes[BEFORE..BEFORE + WINDOW].as_chunks::<16>().0.iter().enumerate() {
+        let chunk: __m128i = bytemuck::cast(*chunk);
+        // SAFETY: these take values, no pointers, and need SSE2 alone, which every x86-64 has.
+        let [others, points, ends] = unsafe {
+            // digits become the ten least of all signed bytes
+            let moved = _mm_add_epi8(chunk, _mm_set1_epi8((0x80 - b'0') as i8));
+            [
+                _mm_movemask_epi8(_mm_cmpgt_epi8(moved, _mm_set1_epi8(i8::MIN + 9))),
+                _mm_movemask_epi8(_mm_cmpeq_epi8(chunk, _mm_set1_epi8(b'.' as i8))),
+                _mm_movemask_epi8(_mm_cmpgt_epi8(_mm_set1_epi8(b'!' as i8), chunk)),
+            ]
+        };
+        let bits = |of_chunk: i32| u64::from(of_chunk as u16) << (16 * k);
+        marks.others |= bits(others);
+        marks.points |= bits(points);
+        marks.ends |= bits(ends);
+    }
+    marks
+}
+
 #[inline]
 #[cfg(not(target_arch = "x86_64"))]
-fn others(window: &[u8; 8 + WINDOW]) -> u64 {
-    let mut bits = 0;
-    for (k, bytes) in window[8..].as_chunks::<8>().0.iter().enumerate() {
-        let high = super::number::others(u64::from_le_bytes(*bytes));
-        // the eight high bits side by side
-        bits |= ((high >> 7).wrapping_mul(0x0102_0408_1020_4080) >> 56) << (8 * k);
+fn marks(bytes: &[u8; BYTES]) -> Marks {
+    plain_marks(bytes)
+}
+
+#[cfg(any(test, not(target_arch = "x86_64")))]
+fn plain_marks(bytes: &[u8; BYTES]) -> Marks {
+    let window = &bytes[BEFORE..BEFORE + WINDOW];
+    let of = |is: fn(u8) -> bool| {
+        window.iter().enumerate().fold(0, |bits, (place, &byte)| bits | u64::from(is(byte)) << place)
+    };
+    Marks {
+        others: of(|byte| !byte.is_ascii_digit()),
+        points: of(|byte| byte == b'.'),
+        ends: of(|byte| (byte as i8) < b'!' as i8),
     }
-    bits
 }
 
 #[cfg(test)]
@@ -127,8 +168,10 @@ mod tests {
         for line in [
             "0.5 -0.25 1.125",
             "-0.000000 0.000000 1234567.12345678",
+            ".00000001 .12345678 .9",
             "0.1 .5 -.5",
             "1234567.1 9999999.99999999 0.00000001",
+            "1234567.1234567 -123456.1234567 -12345.123456",
             "0.03783012 1234567.5 0.1",
         ] {
             assert!(is_triple(line, "\n") && is_triple(line, "\r\n"), "{line}");
@@ -166,12 +209,12 @@ mod tests {
     }
 
     #[test]
-    fn every_byte_that_is_no_digit_is_found() {
+    fn marks_are_those_of_each_byte() {
         for byte in 0..=255 {
-            for place in 0..WINDOW {
-                let mut window = [b'7'; 8 + WINDOW];
-                window[8 + place] = byte;
-                assert_eq!(others(&window), u64::from(!byte.is_ascii_digit()) << place, "{byte} at {place}");
+            for place in 0..BYTES {
+                let mut bytes = [b'7'; BYTES];
+                bytes[place] = byte;
+                assert_eq!(marks(&bytes), plain_marks(&bytes), "{byte} at {place}");
             }
         }
     }

@@ -93,6 +93,30 @@ const TEXTS: &[&str] = &[
     "vn 0 0 1\nv 0 0 0\nvn 0 1 1\nv 1 0 0\nvn 1 0 0\nv 0 1 0\nvn 0 0 0\n# C:\\out\\\nusemtl none\nf 1//1 2//2 3//3\nusemtl rot\nf 3//1 2//2 1//3\nf 1//3 3//2 2//1\n",
 ];
 
+/// Long enough that lines are read many bytes at a time.
+fn exported() -> String {
+    let mut text = String::from("# Blender\nmtllib b_0001.mtl\no Grid\n");
+    for k in 0..12 {
+        text += &format!(
+            "v {:.6} {:.6} {:.6}\n",
+            (k % 4) as f64 * 0.731,
+            (k / 4) as f64 - 0.5,
+            (k * k % 7) as f64 * -0.0123
+        );
+    }
+    for k in 0..12 {
+        text += &format!("vt {:.6} {:.6}\n", (k % 4) as f64 / 3.0, (k / 4) as f64 / 2.0);
+    }
+    for k in 0..5 {
+        text += &format!("vn {:.4} {:.4} {:.4}\n", k as f64 * 0.2, -0.5, 0.25 * k as f64);
+    }
+    text += "usemtl red\ns off\n";
+    for (a, n) in [(1, 1), (2, 2), (3, 2), (5, 3), (6, 5), (7, 4)] {
+        text += &format!("f {a}/{a}/{n} {0}/{0}/{n} {1}/{1}/{n} {2}/{2}/{n}\n", a + 1, a + 5, a + 4);
+    }
+    text
+}
+
 /// Splitmix64 (Steele et al. 2014).
 struct Random(u64);
 
@@ -165,7 +189,10 @@ fn sequences(seed: u64, frames: usize) -> (usize, usize) {
     let library = library();
     let (mut read, mut again) = (0, 0);
     while read < frames {
-        let mut text = TEXTS[random.below(TEXTS.len())].as_bytes().to_vec();
+        let mut text = match random.below(TEXTS.len() + 4) {
+            0..4 => exported().into_bytes(),
+            k => TEXTS[k - 4].as_bytes().to_vec(),
+        };
         let options = ReadOptions {
             lenient: random.below(4) == 0,
             smooth_angle_deg: (random.below(6) == 0).then_some(60.0),
