@@ -11,10 +11,57 @@ const BEFORE: usize = 8;
 /// All bytes looked at; beyond the window no byte is more than there.
 const BYTES: usize = 72;
 
+/// Reads lines of `v`, or `vn` where those are asked for, with three plain decimals, as far as they stand one below the
+/// other. The place behind them; None where there is none.
+#[inline]
+pub(super) fn triples<const NORMALS: bool>(
+    text: &[u8],
+    start: usize,
+    list: &mut Vec<[f32; 3]>,
+) -> Option<usize> {
+    #[cfg(target_arch = "x86_64")]
+    if is_x86_feature_detected!("avx2")
+        && is_x86_feature_detected!("bmi1")
+        && is_x86_feature_detected!("bmi2")
+    {
+        // SAFETY: the processor has what is needed.
+        return unsafe { triples_with_bmi::<NORMALS>(text, start, list) };
+    }
+    triples_of::<NORMALS>(text, start, list)
+}
+
+/// The same operations with fewer instructions.
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2,bmi1,bmi2")]
+fn triples_with_bmi<const NORMALS: bool>(
+    text: &[u8],
+    start: usize,
+    list: &mut Vec<[f32; 3]>,
+) -> Option<usize> {
+    triples_of::<NORMALS>(text, start, list)
+}
+
+#[inline(always)]
+fn triples_of<const NORMALS: bool>(text: &[u8], start: usize, list: &mut Vec<[f32; 3]>) -> Option<usize> {
+    let mut end = None;
+    let mut at = start;
+    loop {
+        let numbers = match text.get(at..).unwrap_or_default().first_chunk::<3>() {
+            Some(b"vn ") if NORMALS => at + 3,
+            Some([b'v', b' ', _]) if !NORMALS => at + 2,
+            _ => return end,
+        };
+        let Some((values, next)) = triple(text, numbers) else { return end };
+        list.push(values);
+        at = next;
+        end = Some(next);
+    }
+}
+
 /// The three numbers at `at`, one blank between them and a line end behind them, and where the next line begins. None
 /// where they are not so, or not surely exact, or too near to an end of the text.
-#[inline]
-pub(super) fn triple(text: &[u8], at: usize) -> Option<([f32; 3], usize)> {
+#[inline(always)]
+fn triple(text: &[u8], at: usize) -> Option<([f32; 3], usize)> {
     let bytes: &[u8; BYTES] = text.get(at.checked_sub(BEFORE)?..)?.first_chunk()?;
     let Marks { others, points, ends } = marks(bytes);
     let (points, ends) = (first_three(points), first_three(ends));
@@ -66,7 +113,7 @@ pub(super) fn triple(text: &[u8], at: usize) -> Option<([f32; 3], usize)> {
 }
 
 /// The places of the lowest three bits; 64 where there are fewer.
-#[inline]
+#[inline(always)]
 fn first_three(mut bits: u64) -> [usize; 3] {
     std::array::from_fn(|_| {
         let place = bits.trailing_zeros() as usize;
@@ -76,7 +123,7 @@ fn first_three(mut bits: u64) -> [usize; 3] {
 }
 
 /// The last `count` bytes of eight, 1 to 8.
-#[inline]
+#[inline(always)]
 fn last(count: usize) -> u64 {
     u64::MAX << ((64 - 8 * count) & 63)
 }
@@ -92,7 +139,7 @@ struct Marks {
     ends: u64,
 }
 
-#[inline]
+#[inline(always)]
 #[cfg(target_arch = "x86_64")]
 fn marks(bytes: &[u8; BYTES]) -> Marks {
     use std::arch::x86_64::{

@@ -2,6 +2,8 @@
 //! byte are not read again; those that differ must name the same positions and texture coordinates. All else is read
 //! as [`scan`](super::scan) reads it, so that what comes out is the same; where that is in doubt, nothing does.
 
+mod line;
+
 use super::check::settle_attribute;
 use super::face;
 use super::mesh::Known;
@@ -10,6 +12,7 @@ use super::usable_normal;
 use crate::format::number::byte;
 use crate::format::text::line_end;
 use crate::scene::{ABSENT, Geometry};
+use line::same_but_normals;
 use memchr::{memchr, memchr_iter, memrchr};
 use std::sync::Arc;
 
@@ -42,6 +45,7 @@ pub(super) fn scan_again<'a>(text: &'a [u8], before: &Parsed) -> Option<Scan<'a>
         texcoords: Cursor { runs: before.runs(Kind::Texcoords), at: 0 },
         corners: 0,
         counts_back: (usize::MAX, false),
+        was_same: true,
     };
     again.scan.positions.reserve_exact(positions);
     again.scan.runs.reserve(before.known.runs.len());
@@ -95,6 +99,8 @@ struct Again<'a, 'b> {
     corners: usize,
     /// Where a run of faces stands in the frame before, and whether an index in it counts back.
     counts_back: (usize, bool),
+    /// Whether the last face stood in the frame before, so that the next may.
+    was_same: bool,
 }
 
 impl Parsed {
@@ -145,14 +151,17 @@ impl Again<'_, '_> {
     /// coordinates.
     fn faces(&mut self, at: usize) -> Option<usize> {
         let run = self.faces.run()?;
-        let known = &self.before.bytes[self.faces.at..run.end];
-        let same = if self.means_the_same(&run) { common_lines(known, &self.text[at..]) } else { 0 };
         let so_far = self.scan.so_far();
+        let may_be_same = self.means_the_same(&run);
+        let known = &self.before.bytes[self.faces.at..run.end];
+        let same = if may_be_same && self.was_same { common_lines(known, &self.text[at..]) } else { 0 };
         let end = if same > 0 {
             let faces = memchr_iter(b'\n', &known[..same]).count();
             self.same_faces(faces)?;
             self.faces.at += same;
             at + same
+        } else if may_be_same && let Some(end) = self.similar_face(at) {
+            end
         } else {
             let end = self.face(at, so_far)?;
             self.faces.at = after_line(&self.before.bytes, self.faces.at);
@@ -189,6 +198,30 @@ impl Again<'_, '_> {
         self.corners = end;
         self.scan.face_count += faces as u32;
         Some(())
+    }
+
+    /// Reads one face whose line differs in nothing but normals.
+    #[inline]
+    fn similar_face(&mut self, at: usize) -> Option<usize> {
+        let count = *self.before.geometry.faces.counts.get(self.scan.face_count as usize)? as usize;
+        let known = &self.before.bytes[..];
+        // two bytes are the word and one blank
+        if byte(known, self.faces.at + 1) != b' ' {
+            return None;
+        }
+        let list = &mut self.scan.faces.normals;
+        list.resize(self.corners, ABSENT);
+        let lines = ((known, self.faces.at + 2), (self.text, at + 2));
+        let Some((known_end, end)) = same_but_normals(lines.0, lines.1, count, list) else {
+            self.was_same = false;
+            return None;
+        };
+        self.was_same =
+            self.before.known.normals.get(self.corners..self.corners + count) == Some(&list[self.corners..]);
+        self.faces.at = known_end;
+        self.corners += count;
+        self.scan.face_count += 1;
+        Some(end)
     }
 
     /// Reads one face.

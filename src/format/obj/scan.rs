@@ -6,7 +6,7 @@ use crate::format::number::{byte, float};
 use crate::format::text::{
     Tally, first_word, is_blank, is_line_end, line_end, trimmed, without_comment, words,
 };
-use crate::format::triple::triple;
+use crate::format::triple::triples;
 use crate::scene::ABSENT;
 use memchr::memchr;
 
@@ -169,7 +169,7 @@ impl<'a> Scan<'a> {
     pub(super) fn statement(&mut self, text: &'a [u8], start: usize) -> usize {
         let start = skip_blanks(text, start);
         match (byte(text, start), byte(text, start + 1)) {
-            (b'v', b' ') if let Some(end) = triples(text, start, b" ", &mut self.positions) => end,
+            (b'v', b' ') if let Some(end) = triples::<false>(text, start, &mut self.positions) => end,
             (b'v', next) if ends_word(next) => self.position(text, start),
             (b'f', next) if ends_word(next) => self.face(text, start),
             (b'v', b't') if ends_word(byte(text, start + 2)) => {
@@ -183,7 +183,7 @@ impl<'a> Scan<'a> {
                 self.note_run(text, Run { kind: Kind::Texcoords, start, end, so_far });
                 end
             }
-            (b'v', b'n') if let Some(end) = triples(text, start, b"n ", &mut self.normals) => end,
+            (b'v', b'n') if let Some(end) = triples::<true>(text, start, &mut self.normals) => end,
             (b'v', b'n') if ends_word(byte(text, start + 2)) => {
                 let (normal, at, malformed) = numbers::<3>(text, start + 2);
                 self.normals.push(normal);
@@ -330,24 +330,6 @@ pub(super) fn push_attribute(list: &mut Vec<u32>, before: usize, index: u32) {
         list.resize(before, ABSENT);
     }
     list.push(index);
-}
-
-/// Reads lines of three plain decimals, `v` and this before them, as far as they stand one below the other. The place
-/// behind them; None where there is none.
-#[inline]
-fn triples(text: &[u8], start: usize, word: &[u8], list: &mut Vec<[f32; 3]>) -> Option<usize> {
-    let mut end = None;
-    let mut at = start;
-    loop {
-        let numbers = at + 1 + word.len();
-        if byte(text, at) != b'v' || text.get(at + 1..numbers) != Some(word) {
-            return end;
-        }
-        let Some((values, next)) = triple(text, numbers) else { return end };
-        list.push(values);
-        at = next;
-        end = Some(next);
-    }
 }
 
 #[inline]
