@@ -10,6 +10,7 @@ mod number;
 mod obj;
 mod text;
 mod texture;
+mod triple;
 
 use crate::clock::Stopwatch;
 use crate::math::Bounds;
@@ -22,7 +23,7 @@ pub use error::FormatError;
 pub use gltf::{ClipChoice, Gltf, GltfClips, GltfFrame, GltfOptions, NamedCamera, gltf_clips, is_gltf};
 pub use library::Library;
 pub use mtl::is_mtl_word;
-pub use obj::{ParsedObj, parse_obj};
+pub use obj::{Parsed, ParsedObj, parse_obj};
 use text::Text;
 pub use texture::{TextureCache, load_picture};
 
@@ -77,27 +78,41 @@ pub struct Loaded {
 /// Reads an OBJ and all that it refers to; textures through a cache. Must not be called from a thread of rayon's pool
 /// (see [`TextureCache`]).
 pub fn load_obj(path: &Path, options: &ReadOptions, textures: &TextureCache) -> Result<Loaded, FormatError> {
+    load_obj_after(None, path, options, textures).map(|(loaded, _)| loaded)
+}
+
+/// [`load_obj`] with another frame of the sequence at hand: what is the same there is not read again, and shared. What
+/// comes out does not depend on it. The second value serves the next frame; None where it would not help.
+pub fn load_obj_after(
+    before: Option<&Parsed>,
+    path: &Path,
+    options: &ReadOptions,
+    textures: &TextureCache,
+) -> Result<(Loaded, Option<Parsed>), FormatError> {
     let watch = Stopwatch::start();
     let bytes = text::read(path)?;
     let read_ms = watch.ms();
     let watch = Stopwatch::start();
     let text = Text::new(&bytes, path)?;
     let mut warnings = Warnings::default();
-    let lines = obj::Lines::new(&text, path, options.lenient, &mut warnings)?;
+    let lines = obj::Lines::new(&text, path, options.lenient, before, &mut warnings)?;
     let mut loader = library::Loader::new(path, options);
     let library = loader.library(lines.libraries(), lines.used_materials(), textures, &mut warnings)?;
-    let parsed = lines.into_parsed(&library, options, &mut warnings);
+    let shape = lines.into_shape(&library, options, &mut warnings);
     let inputs = std::iter::once(path.to_path_buf()).chain(loader.inputs).collect();
-    Ok(Loaded {
-        geometry: Arc::new(parsed.geometry),
+    let bytes_read = bytes.len() as u64 + loader.bytes_read;
+    let (geometry, material_names, parsed) = shape.keep(bytes);
+    let loaded = Loaded {
+        geometry,
         inputs,
-        material_names: parsed.material_names,
-        bytes_read: bytes.len() as u64 + loader.bytes_read,
+        material_names,
+        bytes_read,
         read_ms,
         parse_ms: watch.ms(),
         warnings,
         missing: loader.missing,
-    })
+    };
+    Ok((loaded, parsed))
 }
 
 /// The box of the positions in an OBJ that are finite, as [`load_obj`] gives them; empty where there is none.

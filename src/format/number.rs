@@ -9,10 +9,11 @@ const POWERS: [f64; 23] = [
 ];
 
 /// The same as integers, as far as eight digits go.
-const INTEGER_POWERS: [u64; 9] = [1, 10, 100, 1_000, 10_000, 100_000, 1_000_000, 10_000_000, 100_000_000];
+pub(super) const INTEGER_POWERS: [u64; 9] =
+    [1, 10, 100, 1_000, 10_000, 100_000, 1_000_000, 10_000_000, 100_000_000];
 
 /// The nearest f64 to their inverses, as far.
-const INVERSE_POWERS: [f64; 9] = [1e0, 1e-1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8];
+pub(super) const INVERSE_POWERS: [f64; 9] = [1e0, 1e-1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8];
 
 /// Digits that surely fit a `u64`.
 const MAX_DIGITS: usize = 18;
@@ -25,7 +26,7 @@ pub(super) fn byte(text: &[u8], at: usize) -> u8 {
 
 /// The high bit of each byte that is no digit, and nothing else.
 #[inline]
-fn others(bytes: u64) -> u64 {
+pub(super) fn others(bytes: u64) -> u64 {
     // a digit becomes 0 to 9; adding 0x76 lifts everything else below 0x80, and only that, to 0x80
     let ones = bytes ^ 0x3030_3030_3030_3030;
     (((ones & 0x7F7F_7F7F_7F7F_7F7F) + 0x7676_7676_7676_7676) | ones) & 0x8080_8080_8080_8080
@@ -36,7 +37,12 @@ fn others(bytes: u64) -> u64 {
 fn value(bytes: u64, count: usize) -> u64 {
     // what lies behind is shifted out (in two steps: a shift by 64 is none), then come pairs, fours and all eight
     let half = 32 - 4 * count;
-    let ones = (bytes ^ 0x3030_3030_3030_3030) << half << half;
+    eight_digits((bytes ^ 0x3030_3030_3030_3030) << half << half)
+}
+
+/// The value of eight digits, the first in the lowest byte, each from 0 to 9.
+#[inline]
+pub(super) fn eight_digits(ones: u64) -> u64 {
     let pairs = ones.wrapping_mul(10).wrapping_add(ones >> 8);
     let low = (pairs & 0x0000_00FF_0000_00FF).wrapping_mul(0x000F_4240_0000_0064);
     let high = (pairs >> 16 & 0x0000_00FF_0000_00FF).wrapping_mul(0x0000_2710_0000_0001);
@@ -102,11 +108,18 @@ fn short_decimal(text: &[u8], start: usize) -> Option<(f32, usize)> {
     // fifteen digits are exact; the product is the quotient but for 2 units in the last place, which is as good as
     // exact unless halfway between two f32 is as near
     let value = mantissa as i64 as f64 * INVERSE_POWERS[decimals];
-    if (value.to_bits() & 0x1FFF_FFFF).abs_diff(0x1000_0000) <= 4 {
+    if near_halfway(value) {
         return None;
     }
     let sign = u32::from(window[0] == b'-') << 31;
     Some((f32::from_bits((value as f32).to_bits() | sign), start + end))
+}
+
+/// Whether an f64 lies so near to halfway between two f32 that one of a few units in the last place beside it may be
+/// rounded otherwise.
+#[inline]
+pub(super) fn near_halfway(value: f64) -> bool {
+    (value.to_bits() & 0x1FFF_FFFF).abs_diff(0x1000_0000) <= 4
 }
 
 /// All that [`short_decimal`] leaves.

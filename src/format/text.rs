@@ -116,6 +116,8 @@ fn within_limit(path: &Path, bytes: u64) -> Result<(), FormatError> {
 /// A text file in memory.
 pub(super) struct Text<'a> {
     as_written: &'a [u8],
+    /// Whether a byte-order mark stands before it.
+    is_marked: bool,
     /// Its content with lines joined that `\` continues; as long as what was written, so that a place in one is
     /// the same place in the other.
     pub joined: Cow<'a, [u8]>,
@@ -132,12 +134,17 @@ impl<'a> Text<'a> {
             return Err(FormatError::Utf16 { path: path.to_path_buf() });
         }
         let as_written = bytes.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(bytes);
-        Ok(Self::of_lines(as_written))
+        Ok(Self { is_marked: as_written.len() < bytes.len(), ..Self::of_lines(as_written) })
     }
 
     /// Takes bytes that are text.
     fn of_lines(as_written: &'a [u8]) -> Self {
-        Self { as_written, joined: join_lines(as_written) }
+        Self { as_written, is_marked: false, joined: join_lines(as_written) }
+    }
+
+    /// Whether it is the file byte by byte: no line is continued, no byte-order mark taken off.
+    pub(super) fn is_plain(&self) -> bool {
+        !self.is_marked && matches!(self.joined, Cow::Borrowed(_))
     }
 
     /// The line, from 1, in which the byte at `offset` stands.

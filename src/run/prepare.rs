@@ -34,7 +34,7 @@ pub(super) fn prepare(job: &Job, options: &RunOptions) -> Prepared {
     let mut prepared = Prepared {
         sequences: job.sequences.iter().map(|_| Found::default()).collect(),
         backgrounds: backgrounds(job),
-        sources: Sources::new(options.memory_bytes, options.store_of_run()),
+        sources: Sources::new(options.memory_bytes, options.store_of_run(), options.cold),
         warnings: job.warnings.clone(),
     };
     for (i, sequence) in job.sequences.iter().enumerate() {

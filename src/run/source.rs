@@ -2,7 +2,7 @@
 
 use super::animation::Animations;
 use crate::clock::FileTime;
-use crate::format::{self, FormatError, Loaded, ReadOptions, TextureCache};
+use crate::format::{self, FormatError, Loaded, Parsed, ReadOptions, TextureCache};
 use crate::store::Store;
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
@@ -10,6 +10,9 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 /// A file's state as the system tells it: size and time of change.
 pub(super) type Stamp = (u64, Option<FileTime>);
+
+/// So many layers have a frame kept to read the next by.
+const MAX_LAYERS: usize = 16;
 
 /// How long a file is; 0 where the system does not tell.
 pub(super) fn file_bytes(path: &Path) -> u64 {
@@ -36,14 +39,26 @@ pub struct Sources {
     kept: Mutex<HashMap<PathBuf, Kept>>,
     textures: TextureCache,
     pub(super) animations: Animations,
+    /// Of each layer the frame that was read last, as its text; the layer read last stands last.
+    latest: Mutex<Vec<(PathBuf, Arc<Parsed>)>>,
+    /// What makes a run cold: nothing is kept for later frames.
+    cold: Option<Cold>,
+}
+
+/// What a cold run makes its texture caches of.
+#[derive(Clone, Copy)]
+struct Cold {
+    texture_bytes: Option<u64>,
 }
 
 impl Sources {
-    /// With a limit on the bytes that one frame's textures may take together, and a store.
-    pub(super) fn new(texture_bytes: Option<u64>, store: Option<Arc<Store>>) -> Self {
+    /// With a limit on the bytes that one frame's textures may take together, and a store; `cold` keeps nothing from frame
+    /// to frame but glTF files that are open.
+    pub(super) fn new(texture_bytes: Option<u64>, store: Option<Arc<Store>>, cold: bool) -> Self {
         Self {
             textures: TextureCache::new(texture_bytes, store),
             animations: Animations::with_limit(texture_bytes),
+            cold: cold.then_some(Cold { texture_bytes }),
             ..Self::default()
         }
     }
@@ -61,7 +76,7 @@ impl Sources {
         options: &ReadOptions,
         still: bool,
     ) -> Result<(Arc<Loaded>, bool), FormatError> {
-        self.get(path, options, still, true)
+        self.get(path, options, still && self.cold.is_none(), true)
     }
 
     fn get(
@@ -83,11 +98,49 @@ impl Sources {
                 return Ok(found);
             }
         }
-        let loaded = Arc::new(format::load_obj(path, options, &self.textures)?);
+        let loaded = Arc::new(match self.cold {
+            Some(Cold { texture_bytes }) => {
+                format::load_obj(path, options, &TextureCache::new(texture_bytes, None))?
+            }
+            None => self.load_warm(path, options)?,
+        });
         if keep {
             let entry = Kept { stamp, options: options.clone(), loaded: Arc::clone(&loaded), used: uses };
             self.kept.lock().unwrap_or_else(PoisonError::into_inner).insert(path.to_path_buf(), entry);
         }
         Ok((loaded, true))
     }
+
+    /// Loads an OBJ with the one of its layer at hand that was read last.
+    fn load_warm(&self, path: &Path, options: &ReadOptions) -> Result<Loaded, FormatError> {
+        let layer = without_numbers(path);
+        let before = self.before(&layer);
+        let (loaded, parsed) = format::load_obj_after(before.as_deref(), path, options, &self.textures)?;
+        if let Some(parsed) = parsed {
+            self.keep_latest(layer, parsed);
+        }
+        Ok(loaded)
+    }
+
+    /// The frame of a layer that was read last. Which one it is depends on the readers' pace; what is read by it does
+    /// not.
+    fn before(&self, layer: &Path) -> Option<Arc<Parsed>> {
+        let latest = self.latest.lock().unwrap_or_else(PoisonError::into_inner);
+        latest.iter().find(|(known, _)| known == layer).map(|(_, parsed)| Arc::clone(parsed))
+    }
+
+    fn keep_latest(&self, layer: PathBuf, parsed: Parsed) {
+        let mut latest = self.latest.lock().unwrap_or_else(PoisonError::into_inner);
+        latest.retain(|(known, _)| *known != layer);
+        if latest.len() >= MAX_LAYERS {
+            latest.remove(0);
+        }
+        latest.push((layer, Arc::new(parsed)));
+    }
+}
+
+/// What the files of a layer have in common.
+fn without_numbers(path: &Path) -> PathBuf {
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    path.with_file_name(name.replace(|c: char| c.is_ascii_digit(), ""))
 }

@@ -95,6 +95,9 @@ fn drop_faces(scan: &mut Scan, bad: &[u32]) {
     }
     let mut of_list = keep.iter();
     counts.retain(|_| of_list.next() == Some(&true));
+    scan.face_count = counts.len() as u32;
+    // faces and lines no longer match
+    scan.runs.clear();
     let moved = |face: u32| face - bad.partition_point(|&b| b < face) as u32;
     scan.objects.iter_mut().for_each(|face| *face = moved(*face));
     scan.materials.iter_mut().for_each(|(face, _)| *face = moved(*face));

@@ -1,14 +1,15 @@
 //! From the lists of an OBJ to the parts of a [`Geometry`].
 
-use super::scan::{FaceList, Scan};
+use super::scan::{FaceList, Run, Scan};
 use super::triangulate::triangulate;
 use crate::format::library::Library;
 use crate::scene::normals::{self, DerivedNormals, Smoothing};
 use crate::scene::{
-    ABSENT, Attribute, Colors, Corners, Faces, Geometry, Material, MaterialRuns, Mesh, Normals, Part,
-    PartHash, Positions, Texcoords, Triangles,
+    ABSENT, Attribute, Colors, Content, Corners, Faces, Geometry, Material, MaterialRuns, Mesh, Normals,
+    Part, PartHash, Positions, Texcoords, Triangles,
 };
 use std::collections::HashMap;
+use std::sync::Arc;
 
 /// More `o` lines than this, and the whole file is one mesh.
 const MAX_MESHES: usize = 4096;
@@ -27,7 +28,7 @@ pub(super) struct UsedMaterials<'a> {
 
 /// Gives the materials slots by content: names may differ where the content does not.
 pub(super) fn materials<'a>(scan: &Scan<'a>, library: &Library) -> UsedMaterials<'a> {
-    let faces = scan.faces.counts.len() as u32;
+    let faces = scan.face_count;
     let mut used =
         UsedMaterials { materials: Vec::new(), names: Vec::new(), runs: Vec::new(), unknown: Vec::new() };
     let mut slot_of_content: HashMap<PartHash, u32> = HashMap::new();
@@ -54,27 +55,41 @@ pub(super) fn materials<'a>(scan: &Scan<'a>, library: &Library) -> UsedMaterials
     used
 }
 
+/// What else must be known of an OBJ to read the next that has its faces.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Known {
+    /// Where its faces stand.
+    pub runs: Vec<Run>,
+    /// Indices of texture coordinates of all corners as written; empty where none has one.
+    pub texcoords: Arc<Vec<u32>>,
+    /// The same of normals.
+    pub normals: Arc<Vec<u32>>,
+}
+
 /// Makes the parts. All indices must have been checked.
 pub(super) fn geometry(
     scan: Scan,
     runs: Vec<(u32, u32)>,
     materials: Vec<Part<Material>>,
     smooth_angle_deg: Option<f32>,
-) -> Geometry {
-    let Scan { positions, mut colors, texcoords, normals, faces, objects, smoothing, .. } = scan;
-    let lists = TriangleLists::new(&positions, &faces);
-    let mut starts = TriangleStarts::new(&faces.counts);
-    let material_runs = runs.into_iter().map(|(face, slot)| [starts.at(face), slot]).collect();
-    let meshes = meshes(&objects, &faces.counts);
-    let derived = if lists.normals.is_empty() || lists.normals.as_flattened().contains(&ABSENT) {
-        derived_normals(&positions, &lists.triangles, smooth_angle_deg, &smoothing, &faces.counts)
-    } else {
-        None
-    };
+) -> (Geometry, Known) {
+    let Scan { positions, mut colors, texcoords, normals, faces, objects, smoothing, runs: lines, .. } = scan;
+    let lists = TriangleLists::new(&positions, faces.corners());
+    let derived = derived_normals(
+        &positions,
+        &lists.triangles,
+        &lists.normals,
+        smooth_angle_deg,
+        &smoothing,
+        &faces.counts,
+    );
+    let known = Known { runs: lines, texcoords: Arc::new(faces.texcoords), normals: Arc::new(faces.normals) };
     if !colors.is_empty() {
         colors.resize(positions.len(), [f32::NAN; 3]);
     }
-    Geometry {
+    let geometry = Geometry {
+        material_runs: Part::new(material_runs(runs, &faces.counts)),
+        meshes: meshes(&objects, &faces.counts),
         positions: Part::new(Positions(compact(positions))),
         faces: Part::new(Faces { counts: compact(faces.counts), corners: compact(faces.positions) }),
         triangles: Part::new(Triangles(lists.triangles)),
@@ -84,16 +99,122 @@ pub(super) fn geometry(
         }),
         normals: shading_normals(normals, lists.normals, derived),
         colors: (!colors.is_empty()).then(|| Part::new(Colors(colors))),
-        material_runs: Part::new(MaterialRuns(material_runs)),
+        materials,
+    };
+    (geometry, known)
+}
+
+/// Makes the parts of an OBJ that has the faces of the one before, and shares those that are the same.
+pub(super) fn geometry_again(
+    scan: Scan,
+    runs: Vec<(u32, u32)>,
+    materials: Vec<Part<Material>>,
+    smooth_angle_deg: Option<f32>,
+    before: &Geometry,
+    known: &Known,
+) -> (Geometry, Known) {
+    let Scan { positions, texcoords, normals, faces, objects, smoothing, runs: lines, .. } = scan;
+    let counts = &before.faces.counts[..];
+    let raw =
+        if faces.normals == **known.normals { Arc::clone(&known.normals) } else { Arc::new(faces.normals) };
+    let corners =
+        FaceCorners { counts, positions: &before.faces.corners, texcoords: &known.texcoords, normals: &raw };
+    let as_before = triangles_again(&positions, corners, &before.triangles.0);
+    let (triangles, corners_texcoords, lists) = match as_before {
+        Some(normals) => {
+            let corners = before.texcoords.as_ref().map(|t| t.corners.clone());
+            (before.triangles.clone(), corners, normals)
+        }
+        None => {
+            let lists = TriangleLists::new(&positions, corners);
+            let corners = (!lists.texcoords.is_empty()).then(|| Part::new(Corners(lists.texcoords)));
+            (Part::new(Triangles(lists.triangles)), corners, lists.normals)
+        }
+    };
+    let derived = derived_normals(&positions, &triangles.0, &lists, smooth_angle_deg, &smoothing, counts);
+    let known = Known { runs: lines, texcoords: Arc::clone(&known.texcoords), normals: raw };
+    let texcoords = corners_texcoords.map(|corners| {
+        let old = before.texcoords.as_ref().map(|t| &t.values);
+        Attribute { values: shared(old, Texcoords(texcoords)), corners }
+    });
+    let material_runs = shared(Some(&before.material_runs), material_runs(runs, counts));
+    let meshes = meshes(&objects, counts);
+    let geometry = Geometry {
+        positions: shared(Some(&before.positions), Positions(positions)),
+        faces: before.faces.clone(),
+        triangles,
+        texcoords,
+        normals: shading_normals(normals, lists, derived),
+        colors: None,
+        material_runs,
         materials,
         meshes,
-    }
+    };
+    (geometry, known)
+}
+
+/// The part there was where the content is the same.
+fn shared<T: Content + PartialEq>(before: Option<&Part<T>>, content: T) -> Part<T> {
+    let part = Part::new(content);
+    before.filter(|before| before.hash() == part.hash()).cloned().unwrap_or(part)
+}
+
+fn material_runs(runs: Vec<(u32, u32)>, counts: &[u32]) -> MaterialRuns {
+    let mut starts = TriangleStarts::new(counts);
+    MaterialRuns(runs.into_iter().map(|(face, slot)| [starts.at(face), slot]).collect())
 }
 
 /// Gives back what was reserved beyond need.
 fn compact<T>(mut list: Vec<T>) -> Vec<T> {
     list.shrink_to_fit();
     list
+}
+
+/// Faces and the indices of all their corners; those of an attribute are empty where no corner has it.
+#[derive(Clone, Copy)]
+struct FaceCorners<'a> {
+    counts: &'a [u32],
+    positions: &'a [u32],
+    texcoords: &'a [u32],
+    normals: &'a [u32],
+}
+
+impl FaceList {
+    fn corners(&self) -> FaceCorners<'_> {
+        let Self { counts, positions, texcoords, normals } = self;
+        FaceCorners { counts, positions, texcoords, normals }
+    }
+}
+
+/// The normals' indices of all triangles' corners where polygons still become the same triangles; None where one does
+/// not.
+fn triangles_again(
+    positions: &[[f32; 3]],
+    faces: FaceCorners,
+    mut before: &[[u32; 3]],
+) -> Option<Vec<[u32; 3]>> {
+    if faces.counts.iter().all(|&count| count == 3) {
+        return Some(faces.normals.as_chunks().0.to_vec());
+    }
+    let mut normals = Vec::with_capacity(if faces.normals.is_empty() { 0 } else { before.len() });
+    let mut of_face = Vec::new();
+    let mut first = 0;
+    for &count in faces.counts {
+        let corners = first..first + count as usize;
+        of_face.clear();
+        let of_positions = &faces.positions[corners.clone()];
+        triangulate(positions, of_positions, &mut of_face);
+        let (same, rest) = before.split_at_checked(of_face.len())?;
+        before = rest;
+        if of_face.iter().zip(same).any(|(new, same)| new.map(|k| of_positions[k as usize]) != *same) {
+            return None;
+        }
+        if let Some(indices) = faces.normals.get(corners.clone()) {
+            normals.extend(of_face.iter().map(|triangle| triangle.map(|k| indices[k as usize])));
+        }
+        first = corners.end;
+    }
+    Some(normals)
 }
 
 /// The indices of all triangles' corners; those of an attribute are empty where no corner has it.
@@ -104,25 +225,25 @@ struct TriangleLists {
 }
 
 impl TriangleLists {
-    fn new(positions: &[[f32; 3]], faces: &FaceList) -> Self {
+    fn new(positions: &[[f32; 3]], faces: FaceCorners) -> Self {
         if faces.counts.iter().all(|&count| count == 3) {
             let as_written = |list: &[u32]| list.as_chunks().0.to_vec();
             return Self {
-                triangles: as_written(&faces.positions),
-                texcoords: as_written(&faces.texcoords),
-                normals: as_written(&faces.normals),
+                triangles: as_written(faces.positions),
+                texcoords: as_written(faces.texcoords),
+                normals: as_written(faces.normals),
             };
         }
         let count = faces.positions.len() - 2 * faces.counts.len();
         let reserved = |list: &[u32]| Vec::with_capacity(if list.is_empty() { 0 } else { count });
         let mut lists = Self {
-            triangles: reserved(&faces.positions),
-            texcoords: reserved(&faces.texcoords),
-            normals: reserved(&faces.normals),
+            triangles: reserved(faces.positions),
+            texcoords: reserved(faces.texcoords),
+            normals: reserved(faces.normals),
         };
         let mut of_face = Vec::new();
         let mut first = 0;
-        for &count in &faces.counts {
+        for &count in faces.counts {
             let corners = first..first + count as usize;
             of_face.clear();
             triangulate(positions, &faces.positions[corners.clone()], &mut of_face);
@@ -133,9 +254,9 @@ impl TriangleLists {
                     );
                 }
             };
-            append(&mut lists.triangles, &faces.positions);
-            append(&mut lists.texcoords, &faces.texcoords);
-            append(&mut lists.normals, &faces.normals);
+            append(&mut lists.triangles, faces.positions);
+            append(&mut lists.texcoords, faces.texcoords);
+            append(&mut lists.normals, faces.normals);
             first = corners.end;
         }
         lists
@@ -179,14 +300,18 @@ fn meshes(objects: &[u32], counts: &[u32]) -> Vec<Mesh> {
         .collect()
 }
 
-/// Normals from smoothing groups or by angle; None where all is flat.
+/// Normals from smoothing groups or by angle, where a corner has none of the file's (`given`); None where all is flat.
 fn derived_normals(
     positions: &[[f32; 3]],
     triangles: &[[u32; 3]],
+    given: &[[u32; 3]],
     smooth_angle_deg: Option<f32>,
     groups: &[(u32, u32)],
     counts: &[u32],
 ) -> Option<DerivedNormals> {
+    if !given.is_empty() && !given.as_flattened().contains(&ABSENT) {
+        return None;
+    }
     if let Some(angle) = smooth_angle_deg {
         return Some(normals::derive(positions, triangles, Smoothing::AngleDeg(angle.into())));
     }

@@ -1,8 +1,10 @@
 //! Wavefront OBJ: vertices, polygons, smoothing groups, colours, and which face has which material.
 //!
 //! The bytes are scanned once into lists ([`scan`]), what faces name is checked ([`check`]), polygons become
-//! triangles ([`triangulate`]), and the lists become parts ([`mesh`]).
+//! triangles ([`triangulate`]), and the lists become parts ([`mesh`]). A frame that has the faces of the one before it
+//! is read with that at hand ([`again`]).
 
+mod again;
 mod check;
 mod face;
 mod mesh;
@@ -18,8 +20,12 @@ use super::text::{Tally, Text, first_word, is_line_end, line_end, shown, trimmed
 use crate::math::{Bounds, DVec3};
 use crate::scene::Geometry;
 use crate::warning::Warnings;
+use mesh::Known;
 use scan::Scan;
 use std::path::Path;
+use std::sync::Arc;
+
+pub use again::Parsed;
 
 /// The shape in an OBJ's bytes and the names of its materials.
 #[derive(Clone, Debug)]
@@ -35,6 +41,23 @@ pub(super) struct Lines<'a> {
     scan: Scan<'a>,
     text: &'a Text<'a>,
     path: &'a Path,
+    /// What has the same faces; their lists in `scan` are then empty but for the normals.
+    before: Option<&'a Parsed>,
+}
+
+/// What is read of an OBJ, and what makes the next quicker to read, where there is such a thing.
+pub(super) struct Shape {
+    pub parsed: ParsedObj,
+    known: Option<Known>,
+}
+
+impl Shape {
+    /// The shape, and what to keep for the next frame.
+    pub(super) fn keep(self, bytes: Vec<u8>) -> (Arc<Geometry>, Vec<Vec<u8>>, Option<Parsed>) {
+        let geometry = Arc::new(self.parsed.geometry);
+        let parsed = self.known.map(|known| Parsed { bytes, geometry: Arc::clone(&geometry), known });
+        (geometry, self.parsed.material_names, parsed)
+    }
 }
 
 /// Reads an OBJ from memory. `path` is its name in errors and warnings; `library` what its `usemtl` finds, whatever
@@ -47,8 +70,8 @@ pub fn parse_obj(
     warnings: &mut Warnings,
 ) -> Result<ParsedObj, FormatError> {
     let text = Text::new(bytes, path)?;
-    let lines = Lines::new(&text, path, options.lenient, warnings)?;
-    Ok(lines.into_parsed(library, options, warnings))
+    let lines = Lines::new(&text, path, options.lenient, None, warnings)?;
+    Ok(lines.into_shape(library, options, warnings).parsed)
 }
 
 /// Grows a box by the finite positions in (a part of) an OBJ: those of [`Geometry::positions`], without the rest.
@@ -79,16 +102,22 @@ pub(super) fn library_statements<'t>(text: &'t Text<'_>) -> Vec<&'t [u8]> {
 }
 
 impl<'a> Lines<'a> {
-    /// Reads all lines and checks the faces.
+    /// Reads all lines and checks the faces; sooner where they are those `before`.
     pub(super) fn new(
         text: &'a Text<'a>,
         path: &'a Path,
         lenient: bool,
+        before: Option<&'a Parsed>,
         warnings: &mut Warnings,
     ) -> Result<Self, FormatError> {
+        if let Some(parsed) = before.filter(|_| text.is_plain())
+            && let Some(scan) = again::scan_again(&text.joined, parsed)
+        {
+            return Ok(Self { scan, text, path, before });
+        }
         let mut scan = scan::scan(&text.joined);
         check::check_faces(&mut scan, text, path, lenient, warnings)?;
-        Ok(Self { scan, text, path })
+        Ok(Self { scan, text, path, before: None })
     }
 
     /// What stands behind each `mtllib`.
@@ -102,14 +131,15 @@ impl<'a> Lines<'a> {
     }
 
     /// Makes the shape.
-    pub(super) fn into_parsed(
+    pub(super) fn into_shape(
         mut self,
         library: &Library,
         options: &ReadOptions,
         warnings: &mut Warnings,
-    ) -> ParsedObj {
+    ) -> Shape {
         self.warn_of_oddities(warnings);
-        self.settle_attributes(warnings);
+        let all_usable = self.before.is_some() || self.settle_attributes(warnings);
+        let can_be_known = all_usable && self.can_be_known();
         let used = mesh::materials(&self.scan, library);
         if let Some(name) = used.unknown.first()
             && !library.incomplete
@@ -117,12 +147,29 @@ impl<'a> Lines<'a> {
             let text = format!("material `{}` is in no library; its faces get the default", shown(name));
             warnings.add_times(Some(self.path), None, text, used.unknown.len() as u64);
         }
-        let geometry = mesh::geometry(self.scan, used.runs, used.materials, options.smooth_angle_deg);
+        let angle = options.smooth_angle_deg;
+        let (geometry, known) = match self.before {
+            None => mesh::geometry(self.scan, used.runs, used.materials, angle),
+            Some(Parsed { geometry, known, .. }) => {
+                mesh::geometry_again(self.scan, used.runs, used.materials, angle, geometry, known)
+            }
+        };
         if is_invisible(&geometry) {
             let text = "every face is wholly transparent (d 0); nothing will be seen of them";
             warnings.add(Some(self.path), None, text);
         }
-        ParsedObj { geometry, material_names: used.names }
+        let parsed = ParsedObj { geometry, material_names: used.names };
+        Shape { parsed, known: can_be_known.then_some(known) }
+    }
+
+    /// Whether this can serve as the frame before another: nothing is odd about its faces and vertices.
+    fn can_be_known(&self) -> bool {
+        let Scan { runs, positions, colors, oddities, .. } = &self.scan;
+        self.text.is_plain()
+            && !runs.is_empty()
+            && oddities.malformed.count == 0
+            && colors.is_empty()
+            && positions.iter().all(|p| p.iter().all(|x| x.is_finite()))
     }
 
     fn warn(&self, warnings: &mut Warnings, tally: Tally, text: impl Into<String>) {
@@ -139,7 +186,8 @@ impl<'a> Lines<'a> {
         let unknown = format!("unknown statements are skipped, the first is `{}`", shown(odd.unknown_word));
         self.warn(warnings, odd.unknown, unknown);
         let many = triangulate::MAX_EAR_CORNERS;
-        let huge = self.scan.faces.counts.iter().filter(|&&count| count as usize > many).count();
+        let counts = self.before.map_or(&self.scan.faces.counts, |before| &before.geometry.faces.counts);
+        let huge = counts.iter().filter(|&&count| count as usize > many).count();
         if huge > 0 {
             let text =
                 format!("a face of more than {many} corners becomes a fan, right only if it is convex");
@@ -150,24 +198,27 @@ impl<'a> Lines<'a> {
         }
     }
 
-    /// Texture coordinates and normals that cannot be used count as absent.
-    fn settle_attributes(&mut self, warnings: &mut Warnings) {
+    /// Texture coordinates and normals that cannot be used count as absent; whether there are none.
+    fn settle_attributes(&mut self, warnings: &mut Warnings) -> bool {
         let Scan { faces, texcoords, normals, .. } = &mut self.scan;
         let corners = faces.positions.len();
         let finite = |t: &[f32; 2]| t.iter().all(|x| x.is_finite());
-        let directed = |n: &[f32; 3]| {
-            let squared: f64 = n.iter().map(|&x| f64::from(x) * f64::from(x)).sum();
-            squared > 0.0 && squared.is_finite()
-        };
         let refused = [
             ("texcoord", check::settle_attribute(&mut faces.texcoords, corners, texcoords, finite)),
-            ("normal", check::settle_attribute(&mut faces.normals, corners, normals, directed)),
+            ("normal", check::settle_attribute(&mut faces.normals, corners, normals, usable_normal)),
         ];
         for (kind, count) in refused.into_iter().filter(|&(_, count)| count > 0) {
             let text = format!("a {kind} index names none that can be used; it counts as absent");
             warnings.add_times(Some(self.path), None, text, count);
         }
+        refused.iter().all(|&(_, count)| count == 0)
     }
+}
+
+/// Whether a normal has a direction.
+fn usable_normal(normal: &[f32; 3]) -> bool {
+    let squared: f64 = normal.iter().map(|&x| f64::from(x) * f64::from(x)).sum();
+    squared > 0.0 && squared.is_finite()
 }
 
 /// Whether there are faces and all of them have d 0, in a model where that hides them: some exporters write it

@@ -6,6 +6,7 @@ use crate::format::number::{byte, float};
 use crate::format::text::{
     Tally, first_word, is_blank, is_line_end, line_end, trimmed, without_comment, words,
 };
+use crate::format::triple::triples;
 use crate::scene::ABSENT;
 use memchr::memchr;
 
@@ -22,6 +23,10 @@ pub(super) struct Scan<'a> {
     pub normals: Vec<[f32; 3]>,
     /// `f` of three corners and more.
     pub faces: FaceList,
+    /// How many they are.
+    pub face_count: u32,
+    /// Where texture coordinates and faces stand.
+    pub runs: Vec<Run>,
     /// Where `o` stands.
     pub objects: Vec<u32>,
     /// Names of materials.
@@ -46,6 +51,29 @@ pub(super) struct FaceList {
     pub texcoords: Vec<u32>,
     /// Their normals; empty where no corner has one.
     pub normals: Vec<u32>,
+}
+
+/// What stands in a run of lines.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Kind {
+    /// `vt`.
+    Texcoords,
+    /// `f` of three corners and more.
+    Faces,
+}
+
+/// Lines of one kind with nothing between them, from the word of the first to the end of the last. Each but the last
+/// ends with its only LF.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Run {
+    /// What they are.
+    pub kind: Kind,
+    /// Where the first begins.
+    pub start: usize,
+    /// The place behind the last.
+    pub end: usize,
+    /// How many positions, texture coordinates and normals stand before the first.
+    pub so_far: [usize; 3],
 }
 
 /// What was met and left out.
@@ -132,26 +160,30 @@ fn next_statement(text: &[u8], word: u8, mut at: usize) -> Option<usize> {
 impl<'a> Scan<'a> {
     /// Each run of faces that has a material: its first face and the material's name.
     pub(super) fn material_runs(&self) -> impl Iterator<Item = (u32, &'a [u8])> {
-        let ends =
-            self.materials.iter().skip(1).map(|&(face, _)| face).chain([self.faces.counts.len() as u32]);
+        let ends = self.materials.iter().skip(1).map(|&(face, _)| face).chain([self.face_count]);
         self.materials.iter().copied().zip(ends).filter(|((face, _), end)| face < end).map(|(run, _)| run)
     }
 
     /// Reads the statement at `start`; the place where the next line begins.
     #[inline]
-    fn statement(&mut self, text: &'a [u8], start: usize) -> usize {
+    pub(super) fn statement(&mut self, text: &'a [u8], start: usize) -> usize {
         let start = skip_blanks(text, start);
         match (byte(text, start), byte(text, start + 1)) {
+            (b'v', b' ') if let Some(end) = triples::<false>(text, start, &mut self.positions) => end,
             (b'v', next) if ends_word(next) => self.position(text, start),
             (b'f', next) if ends_word(next) => self.face(text, start),
             (b'v', b't') if ends_word(byte(text, start + 2)) => {
                 let (values, at, malformed) = numbers::<1>(text, start + 2);
                 let (second, at) = optional(text, at);
                 // one number is a place along a line; a second that is malformed must not pass for 0
+                let so_far = self.so_far();
                 self.texcoords.push([values[0], second.unwrap_or(0.0)]);
                 self.note_malformed(malformed || second.is_some_and(f32::is_nan), start);
-                after_line(text, at)
+                let end = after_line(text, at);
+                self.note_run(text, Run { kind: Kind::Texcoords, start, end, so_far });
+                end
             }
+            (b'v', b'n') if let Some(end) = triples::<true>(text, start, &mut self.normals) => end,
             (b'v', b'n') if ends_word(byte(text, start + 2)) => {
                 let (normal, at, malformed) = numbers::<3>(text, start + 2);
                 self.normals.push(normal);
@@ -167,6 +199,30 @@ impl<'a> Scan<'a> {
     fn note_malformed(&mut self, malformed: bool, start: usize) {
         if malformed {
             self.oddities.malformed.add(start);
+        }
+    }
+
+    /// How many positions, texture coordinates and normals there are.
+    #[inline]
+    pub(super) fn so_far(&self) -> [usize; 3] {
+        [self.positions.len(), self.texcoords.len(), self.normals.len()]
+    }
+
+    /// Takes lines into the last run, else as a new one.
+    #[inline]
+    pub(super) fn note_run(&mut self, text: &[u8], mut run: Run) {
+        run.end = run.end.min(text.len());
+        if text[..run.end].ends_with(b"\r") && text.get(run.end) == Some(&b'\n') {
+            run.end += 1;
+        }
+        if let Some(last) = self.runs.last_mut()
+            && last.kind == run.kind
+            && last.end == run.start
+            && text[..run.start].ends_with(b"\n")
+        {
+            last.end = run.end;
+        } else {
+            self.runs.push(run);
         }
     }
 
@@ -202,7 +258,7 @@ impl<'a> Scan<'a> {
 
     #[inline]
     fn face(&mut self, text: &[u8], start: usize) -> usize {
-        let so_far = [self.positions.len(), self.texcoords.len(), self.normals.len()];
+        let so_far = self.so_far();
         let first = self.faces.positions.len();
         let mut at = skip_blanks(text, start + 1);
         while !ends_line(byte(text, at)) {
@@ -214,10 +270,13 @@ impl<'a> Scan<'a> {
         if count < 3 {
             self.faces.truncate(first);
             self.oddities.short_faces.add(start);
-        } else {
-            self.faces.counts.push(count as u32);
+            return after_line(text, at);
         }
-        after_line(text, at)
+        self.faces.counts.push(count as u32);
+        self.face_count += 1;
+        let end = after_line(text, at);
+        self.note_run(text, Run { kind: Kind::Faces, start, end, so_far });
+        end
     }
 
     /// Every other statement, and comments.
@@ -225,7 +284,7 @@ impl<'a> Scan<'a> {
         let end = line_end(text, start);
         let line = without_comment(&text[start..end]);
         let (keyword, rest) = first_word(line);
-        let face = self.faces.counts.len() as u32;
+        let face = self.face_count;
         match keyword {
             b"" => {}
             b"o" => self.objects.push(face),
@@ -263,7 +322,7 @@ impl FaceList {
 
 /// Appends an index to a list that stays empty until a corner has one.
 #[inline]
-fn push_attribute(list: &mut Vec<u32>, before: usize, index: u32) {
+pub(super) fn push_attribute(list: &mut Vec<u32>, before: usize, index: u32) {
     if index == ABSENT && list.is_empty() {
         return;
     }
@@ -274,7 +333,7 @@ fn push_attribute(list: &mut Vec<u32>, before: usize, index: u32) {
 }
 
 #[inline]
-fn skip_blanks(text: &[u8], mut at: usize) -> usize {
+pub(super) fn skip_blanks(text: &[u8], mut at: usize) -> usize {
     while is_blank(byte(text, at)) {
         at += 1;
     }
@@ -288,7 +347,7 @@ fn ends_word(byte: u8) -> bool {
 
 /// Whether nothing but a comment can follow.
 #[inline]
-fn ends_line(byte: u8) -> bool {
+pub(super) fn ends_line(byte: u8) -> bool {
     is_line_end(byte) || byte == b'#'
 }
 
