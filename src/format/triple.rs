@@ -2,6 +2,9 @@
 //! stands are found at once, so that no number waits for the one before it. What is not of this form is left to
 //! [`float`](super::number::float), whose values these are, bit by bit.
 
+// A part that is not inlined is a call for each number, and is compiled for the least of processors.
+#![allow(clippy::inline_always)]
+
 use super::number::{INTEGER_POWERS, INVERSE_POWERS, eight_digits, near_halfway};
 
 /// Bytes in which the numbers must stand, with what ends them.

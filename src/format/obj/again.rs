@@ -265,15 +265,17 @@ fn common_lines(a: &[u8], b: &[u8]) -> usize {
     memrchr(b'\n', &a[..common(a, b)]).map_or(0, |last| last + 1)
 }
 
+/// Compared in one go.
+const STEP_BYTES: usize = 256;
+
 /// How many bytes are the same in both.
 fn common(a: &[u8], b: &[u8]) -> usize {
     let length = a.len().min(b.len());
     let (a, b) = (&a[..length], &b[..length]);
     let mut at = 0;
     // long runs at the speed of memory, then the place
-    const STEP: usize = 256;
-    while at + STEP <= length && a[at..at + STEP] == b[at..at + STEP] {
-        at += STEP;
+    while at + STEP_BYTES <= length && a[at..at + STEP_BYTES] == b[at..at + STEP_BYTES] {
+        at += STEP_BYTES;
     }
     while let (Some(x), Some(y)) = (a[at..].first_chunk::<8>(), b[at..].first_chunk::<8>()) {
         let differs = u64::from_le_bytes(*x) ^ u64::from_le_bytes(*y);

@@ -218,6 +218,53 @@ fn sequences(seed: u64, frames: usize) -> (usize, usize) {
     (read, again)
 }
 
+/// What is read of the second text by the first, which must be possible.
+fn read_again(first: &str, second: &str) -> [Arc<Geometry>; 2] {
+    let (options, library) = (ReadOptions::default(), library());
+    let first = same(first.as_bytes(), None, &options, &library).unwrap();
+    let second = same(second.as_bytes(), first.parsed.as_ref(), &options, &library).unwrap();
+    assert!(second.again);
+    [first.geometry, second.geometry]
+}
+
+#[test]
+fn what_is_the_same_is_shared() {
+    let text = exported();
+    let moved = text.replace("0.731000", "0.741000");
+    let [a, b] = read_again(&text, &moved);
+    assert_ne!(a.positions, b.positions);
+    let share = |x: &[[u32; 3]], y: &[[u32; 3]]| x.as_ptr() == y.as_ptr();
+    assert!(share(&a.triangles.0, &b.triangles.0) && a.faces.corners.as_ptr() == b.faces.corners.as_ptr());
+    let (ta, tb) = (a.texcoords.as_ref().unwrap(), b.texcoords.as_ref().unwrap());
+    assert!(share(&ta.corners.0, &tb.corners.0) && ta.values.0.as_ptr() == tb.values.0.as_ptr());
+    assert_eq!(a.normals, b.normals);
+}
+
+#[test]
+fn other_names_and_normals_leave_faces_as_they_are() {
+    let text = exported();
+    let renumbered = text
+        .replace("usemtl red", "usemtl red.001")
+        .replace("o Grid", "o Grid.001")
+        .replace("b_0001", "b_0002")
+        .replace("usemtl", "vn 0.0000 1.0000 0.0000\nusemtl")
+        .replace("/5 ", "/6 ")
+        .replace("/5\n", "/6\n");
+    let [a, b] = read_again(&text, &renumbered);
+    assert_eq!(a.triangles.0.as_ptr(), b.triangles.0.as_ptr());
+    assert_ne!(a.normals, b.normals);
+}
+
+#[test]
+fn a_quad_that_becomes_concave_is_cut_the_other_way() {
+    let convex = "v 0 0 0\nv 2 1 0\nv 4 0 0\nv 2 4 0\nf 2 3 4 1\n";
+    let [a, b] = read_again(&convex.replace("2 1 0", "2 -1 0"), &convex.replace("f 2", "f  2"));
+    assert_eq!((a.faces.hash(), a.triangles.0.len()), (b.faces.hash(), b.triangles.0.len()));
+    let notch = &convex.replace("f 2 3 4 1", "f 1 2 3 4");
+    let [a, b] = read_again(&notch.replace("2 1 0", "2 -1 0"), notch);
+    assert_ne!(a.triangles, b.triangles);
+}
+
 #[test]
 fn the_frame_before_changes_nothing() {
     let (read, again) = sequences(1, 4000);
