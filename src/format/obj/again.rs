@@ -214,10 +214,10 @@ impl Again<'_, '_> {
             && let Some(&count) = counts.get(face)
             && known.get(known_at..).is_some_and(|line| line.starts_with(b"f "))
             && self.text.get(at..).is_some_and(|line| line.starts_with(b"f "))
-            && let Some((known_end, end)) =
+            && let Some((known_end, end, is_same)) =
                 same_but_normals((known, known_at + 2), (self.text, at + 2), count as usize, list)
         {
-            self.was_same = known[known_at..known_end] == self.text[at..end];
+            self.was_same = is_same;
             (known_at, at) = (known_end, end);
             face += 1;
         }

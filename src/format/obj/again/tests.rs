@@ -4,6 +4,7 @@ use crate::format::text::Text;
 use crate::format::{FormatError, ReadOptions};
 use crate::scene::{Geometry, Material, Part};
 use crate::warning::Warnings;
+use std::fmt::Write;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -97,22 +98,23 @@ const TEXTS: &[&str] = &[
 fn exported() -> String {
     let mut text = String::from("# Blender\nmtllib b_0001.mtl\no Grid\n");
     for k in 0..12 {
-        text += &format!(
-            "v {:.6} {:.6} {:.6}\n",
+        let _ = writeln!(
+            text,
+            "v {:.6} {:.6} {:.6}",
             (k % 4) as f64 * 0.731,
             (k / 4) as f64 - 0.5,
             (k * k % 7) as f64 * -0.0123
         );
     }
     for k in 0..12 {
-        text += &format!("vt {:.6} {:.6}\n", (k % 4) as f64 / 3.0, (k / 4) as f64 / 2.0);
+        let _ = writeln!(text, "vt {:.6} {:.6}", (k % 4) as f64 / 3.0, (k / 4) as f64 / 2.0);
     }
     for k in 0..5 {
-        text += &format!("vn {:.4} {:.4} {:.4}\n", k as f64 * 0.2, -0.5, 0.25 * k as f64);
+        let _ = writeln!(text, "vn {:.4} {:.4} {:.4}", k as f64 * 0.2, -0.5, 0.25 * k as f64);
     }
     text += "usemtl red\ns off\n";
     for (a, n) in [(1, 1), (2, 2), (3, 2), (5, 3), (6, 5), (7, 4)] {
-        text += &format!("f {a}/{a}/{n} {0}/{0}/{n} {1}/{1}/{n} {2}/{2}/{n}\n", a + 1, a + 5, a + 4);
+        let _ = writeln!(text, "f {a}/{a}/{n} {0}/{0}/{n} {1}/{1}/{n} {2}/{2}/{n}", a + 1, a + 5, a + 4);
     }
     text
 }
