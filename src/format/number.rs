@@ -41,7 +41,8 @@ fn value(bytes: u64, count: usize) -> u64 {
 }
 
 /// The value of eight digits, the first in the lowest byte, each from 0 to 9.
-#[inline]
+#[inline(always)]
+#[allow(clippy::inline_always, reason = "as in `triple`")]
 pub(super) fn eight_digits(ones: u64) -> u64 {
     let pairs = ones.wrapping_mul(10).wrapping_add(ones >> 8);
     let low = (pairs & 0x0000_00FF_0000_00FF).wrapping_mul(0x000F_4240_0000_0064);
@@ -117,7 +118,8 @@ fn short_decimal(text: &[u8], start: usize) -> Option<(f32, usize)> {
 
 /// Whether an f64 lies so near to halfway between two f32 that one of a few units in the last place beside it may be
 /// rounded otherwise.
-#[inline]
+#[inline(always)]
+#[allow(clippy::inline_always, reason = "as in `triple`")]
 pub(super) fn near_halfway(value: f64) -> bool {
     (value.to_bits() & 0x1FFF_FFFF).abs_diff(0x1000_0000) <= 4
 }

@@ -2,6 +2,9 @@
 //! stands are found at once, so that no number waits for the one before it. What is not of this form is left to
 //! [`float`](super::number::float), whose values these are, bit by bit.
 
+// A part that is not inlined is a call for each number, and is compiled for the least of processors.
+#![allow(clippy::inline_always)]
+
 use super::number::{INTEGER_POWERS, INVERSE_POWERS, eight_digits, near_halfway};
 
 /// Bytes in which the numbers must stand, with what ends them.
@@ -69,15 +72,16 @@ fn triple(text: &[u8], at: usize) -> Option<([f32; 3], usize)> {
         return None;
     }
     let starts = [0, ends[0] + 1, ends[1] + 1];
-    let signs = starts.map(|start| u64::from(bytes[BEFORE + (start & 63)] == b'-'));
-    let signed = |k: usize| signs[k] as usize;
-    // wrong orders become large numbers
-    let digits: [usize; 3] = std::array::from_fn(|k| points[k].wrapping_sub(starts[k] + signed(k)));
-    let decimals: [usize; 3] = std::array::from_fn(|k| ends[k].wrapping_sub(points[k] + 1));
-    let few = (digits[0] | digits[1] | digits[2]) < 8;
-    let some = decimals.iter().fold(0, |all, count| all | count.wrapping_sub(1)) < 8;
-    let expected = (0..3).fold(0, |all, k| all | 1 << points[k] | 1 << ends[k] | signs[k] << starts[k]);
+    let words = [
+        Word::new(bytes, starts[0], points[0], ends[0]),
+        Word::new(bytes, starts[1], points[1], ends[1]),
+        Word::new(bytes, starts[2], points[2], ends[2]),
+    ];
+    let [a, b, c] = &words;
+    let few = (a.digits | b.digits | c.digits) < 8;
+    let some = (a.decimals.wrapping_sub(1) | b.decimals.wrapping_sub(1) | c.decimals.wrapping_sub(1)) < 8;
     let between = bytes[BEFORE + (ends[0] & 63)] == b' ' && bytes[BEFORE + (ends[1] & 63)] == b' ';
+    let expected = a.others() | b.others() | c.others();
     if !(few && some && between && others & ((2 << ends[2]) - 1) == expected) {
         return None;
     }
@@ -86,40 +90,86 @@ fn triple(text: &[u8], at: usize) -> Option<([f32; 3], usize)> {
         (b'\r', b'\n') => 2,
         _ => return None,
     };
-    // the eight bytes before this place, as digits
-    let eight = |place: usize| {
-        let eight = bytes[place & 63..].first_chunk().copied().unwrap_or_default();
-        u64::from_le_bytes(eight) ^ 0x3030_3030_3030_3030
+    let is_short = (a.digits + a.decimals).max(b.digits + b.decimals).max(c.digits + c.decimals) <= 8;
+    let scaled = if is_short {
+        [a.short(bytes), b.short(bytes), c.short(bytes)]
+    } else {
+        [a.long(bytes), b.long(bytes), c.long(bytes)]
     };
-    let is_short = (0..3).all(|k| digits[k] + decimals[k] <= 8);
-    let mut is_exact = true;
-    let values = std::array::from_fn(|k| {
-        let of_decimals = last(decimals[k]);
-        let behind = eight(ends[k]) & of_decimals;
-        let mantissa = if is_short {
-            // the point taken out
-            let before = eight(ends[k] - 1) & last(digits[k] + decimals[k]) & !of_decimals;
-            eight_digits(behind | before)
-        } else {
-            // in two steps: there may be no digit, and a shift by 64 is none
-            let whole = eight(points[k]) & (last(digits[k] + 1) << 8);
-            eight_digits(whole) * INTEGER_POWERS[decimals[k]] + eight_digits(behind)
-        };
-        let scaled = mantissa as i64 as f64 * INVERSE_POWERS[decimals[k]];
-        is_exact &= !near_halfway(scaled);
-        f32::from_bits((scaled as f32).to_bits() | (signs[k] as u32) << 31)
-    });
-    is_exact.then_some((values, at + ends[2] + length))
+    if near_halfway(scaled[0]) | near_halfway(scaled[1]) | near_halfway(scaled[2]) {
+        return None;
+    }
+    let values = [a.signed(scaled[0]), b.signed(scaled[1]), c.signed(scaled[2])];
+    Some((values, at + ends[2] + length))
+}
+
+/// Where a number's bytes stand in the window.
+struct Word {
+    start: usize,
+    point: usize,
+    end: usize,
+    /// 1 where a minus stands before it.
+    minus: usize,
+    /// How many digits stand before and behind the point; large numbers where the places are in a wrong order.
+    digits: usize,
+    decimals: usize,
+}
+
+impl Word {
+    #[inline(always)]
+    fn new(bytes: &[u8; BYTES], start: usize, point: usize, end: usize) -> Self {
+        let minus = usize::from(bytes[BEFORE + (start & 63)] == b'-');
+        let digits = point.wrapping_sub(start + minus);
+        Self { start, point, end, minus, digits, decimals: end.wrapping_sub(point + 1) }
+    }
+
+    /// What is no digit.
+    #[inline(always)]
+    fn others(&self) -> u64 {
+        1 << (self.point & 63) | 1 << (self.end & 63) | (self.minus as u64) << (self.start & 63)
+    }
+
+    /// The value without its sign, of at most eight digits: taken together once the point is out.
+    #[inline(always)]
+    fn short(&self, bytes: &[u8; BYTES]) -> f64 {
+        let of_decimals = last(self.decimals);
+        let before = eight(bytes, self.end - 1) & last(self.digits + self.decimals) & !of_decimals;
+        self.scaled(eight_digits(eight(bytes, self.end) & of_decimals | before))
+    }
+
+    /// The value without its sign, of at most fifteen digits.
+    #[inline(always)]
+    fn long(&self, bytes: &[u8; BYTES]) -> f64 {
+        // in two steps: there may be no digit, and a shift by 64 is none
+        let whole = eight(bytes, self.point) & (last(self.digits + 1) << 8);
+        let behind = eight(bytes, self.end) & last(self.decimals);
+        self.scaled(eight_digits(whole) * INTEGER_POWERS[self.decimals] + eight_digits(behind))
+    }
+
+    #[inline(always)]
+    fn scaled(&self, mantissa: u64) -> f64 {
+        mantissa as i64 as f64 * INVERSE_POWERS[self.decimals]
+    }
+
+    #[inline(always)]
+    fn signed(&self, value: f64) -> f32 {
+        f32::from_bits((value as f32).to_bits() | (self.minus as u32) << 31)
+    }
+}
+
+/// The eight bytes before a place in the window, as digits.
+#[inline(always)]
+fn eight(bytes: &[u8; BYTES], place: usize) -> u64 {
+    let eight = bytes[place & 63..].first_chunk().copied().unwrap_or_default();
+    u64::from_le_bytes(eight) ^ 0x3030_3030_3030_3030
 }
 
 /// The places of the lowest three bits; 64 where there are fewer.
 #[inline(always)]
-fn first_three(mut bits: u64) -> [usize; 3] {
-    std::array::from_fn(|_| {
-        let place = bits.trailing_zeros() as usize;
-        bits &= bits.wrapping_sub(1);
-        place
-    })
+fn first_three(bits: u64) -> [usize; 3] {
+    let second = bits & bits.wrapping_sub(1);
+    let third = second & second.wrapping_sub(1);
+    [bits.trailing_zeros() as usize, second.trailing_zeros() as usize, third.trailing_zeros() as usize]
 }
 
 /// The last `count` bytes of eight, 1 to 8.

@@ -160,11 +160,12 @@ impl Again<'_, '_> {
             self.same_faces(faces)?;
             self.faces.at += same;
             at + same
-        } else if may_be_same && let Some(end) = self.similar_face(at) {
+        } else if may_be_same && let Some(end) = self.similar_faces(at, run.end) {
             end
         } else {
             let end = self.face(at, so_far)?;
             self.faces.at = after_line(&self.before.bytes, self.faces.at);
+            self.was_same = true;
             end
         };
         self.scan.note_run(self.text, Run { kind: Kind::Faces, start: at, end, so_far });
@@ -200,28 +201,30 @@ impl Again<'_, '_> {
         Some(())
     }
 
-    /// Reads one face whose line differs in nothing but normals.
-    #[inline]
-    fn similar_face(&mut self, at: usize) -> Option<usize> {
-        let count = *self.before.geometry.faces.counts.get(self.scan.face_count as usize)? as usize;
-        let known = &self.before.bytes[..];
-        // two bytes are the word and one blank
-        if byte(known, self.faces.at + 1) != b' ' {
-            return None;
-        }
+    /// Reads faces whose lines differ in nothing but normals, up to one that is the same in those too or to the end of
+    /// the run.
+    fn similar_faces(&mut self, start: usize, run_end: usize) -> Option<usize> {
+        let counts = &self.before.geometry.faces.counts[..];
+        let known = &self.before.bytes[..run_end];
         let list = &mut self.scan.faces.normals;
         list.resize(self.corners, ABSENT);
-        let lines = ((known, self.faces.at + 2), (self.text, at + 2));
-        let Some((known_end, end)) = same_but_normals(lines.0, lines.1, count, list) else {
-            self.was_same = false;
-            return None;
-        };
-        self.was_same =
-            self.before.known.normals.get(self.corners..self.corners + count) == Some(&list[self.corners..]);
-        self.faces.at = known_end;
-        self.corners += count;
-        self.scan.face_count += 1;
-        Some(end)
+        let (mut face, mut known_at, mut at) = (self.scan.face_count as usize, self.faces.at, start);
+        self.was_same = false;
+        while !self.was_same
+            && let Some(&count) = counts.get(face)
+            && known.get(known_at..).is_some_and(|line| line.starts_with(b"f "))
+            && self.text.get(at..).is_some_and(|line| line.starts_with(b"f "))
+            && let Some((known_end, end, is_same)) =
+                same_but_normals((known, known_at + 2), (self.text, at + 2), count as usize, list)
+        {
+            self.was_same = is_same;
+            (known_at, at) = (known_end, end);
+            face += 1;
+        }
+        self.corners = list.len();
+        self.scan.face_count = face as u32;
+        self.faces.at = known_at;
+        (at > start).then_some(at)
     }
 
     /// Reads one face.
@@ -262,15 +265,17 @@ fn common_lines(a: &[u8], b: &[u8]) -> usize {
     memrchr(b'\n', &a[..common(a, b)]).map_or(0, |last| last + 1)
 }
 
+/// Compared in one go.
+const STEP_BYTES: usize = 256;
+
 /// How many bytes are the same in both.
 fn common(a: &[u8], b: &[u8]) -> usize {
     let length = a.len().min(b.len());
     let (a, b) = (&a[..length], &b[..length]);
     let mut at = 0;
     // long runs at the speed of memory, then the place
-    const STEP: usize = 256;
-    while at + STEP <= length && a[at..at + STEP] == b[at..at + STEP] {
-        at += STEP;
+    while at + STEP_BYTES <= length && a[at..at + STEP_BYTES] == b[at..at + STEP_BYTES] {
+        at += STEP_BYTES;
     }
     while let (Some(x), Some(y)) = (a[at..].first_chunk::<8>(), b[at..].first_chunk::<8>()) {
         let differs = u64::from_le_bytes(*x) ^ u64::from_le_bytes(*y);

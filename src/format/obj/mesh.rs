@@ -120,16 +120,12 @@ pub(super) fn geometry_again(
     let corners =
         FaceCorners { counts, positions: &before.faces.corners, texcoords: &known.texcoords, normals: &raw };
     let as_before = triangles_again(&positions, corners, &before.triangles.0);
-    let (triangles, corners_texcoords, lists) = match as_before {
-        Some(normals) => {
-            let corners = before.texcoords.as_ref().map(|t| t.corners.clone());
-            (before.triangles.clone(), corners, normals)
-        }
-        None => {
-            let lists = TriangleLists::new(&positions, corners);
-            let corners = (!lists.texcoords.is_empty()).then(|| Part::new(Corners(lists.texcoords)));
-            (Part::new(Triangles(lists.triangles)), corners, lists.normals)
-        }
+    let (triangles, corners_texcoords, lists) = if let Some(normals) = as_before {
+        (before.triangles.clone(), before.texcoords.as_ref().map(|t| t.corners.clone()), normals)
+    } else {
+        let lists = TriangleLists::new(&positions, corners);
+        let corners = (!lists.texcoords.is_empty()).then(|| Part::new(Corners(lists.texcoords)));
+        (Part::new(Triangles(lists.triangles)), corners, lists.normals)
     };
     let derived = derived_normals(&positions, &triangles.0, &lists, smooth_angle_deg, &smoothing, counts);
     let known = Known { runs: lines, texcoords: Arc::clone(&known.texcoords), normals: raw };

@@ -4,6 +4,7 @@ use crate::format::text::Text;
 use crate::format::{FormatError, ReadOptions};
 use crate::scene::{Geometry, Material, Part};
 use crate::warning::Warnings;
+use std::fmt::Write;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -97,22 +98,23 @@ const TEXTS: &[&str] = &[
 fn exported() -> String {
     let mut text = String::from("# Blender\nmtllib b_0001.mtl\no Grid\n");
     for k in 0..12 {
-        text += &format!(
-            "v {:.6} {:.6} {:.6}\n",
+        let _ = writeln!(
+            text,
+            "v {:.6} {:.6} {:.6}",
             (k % 4) as f64 * 0.731,
             (k / 4) as f64 - 0.5,
             (k * k % 7) as f64 * -0.0123
         );
     }
     for k in 0..12 {
-        text += &format!("vt {:.6} {:.6}\n", (k % 4) as f64 / 3.0, (k / 4) as f64 / 2.0);
+        let _ = writeln!(text, "vt {:.6} {:.6}", (k % 4) as f64 / 3.0, (k / 4) as f64 / 2.0);
     }
     for k in 0..5 {
-        text += &format!("vn {:.4} {:.4} {:.4}\n", k as f64 * 0.2, -0.5, 0.25 * k as f64);
+        let _ = writeln!(text, "vn {:.4} {:.4} {:.4}", k as f64 * 0.2, -0.5, 0.25 * k as f64);
     }
     text += "usemtl red\ns off\n";
     for (a, n) in [(1, 1), (2, 2), (3, 2), (5, 3), (6, 5), (7, 4)] {
-        text += &format!("f {a}/{a}/{n} {0}/{0}/{n} {1}/{1}/{n} {2}/{2}/{n}\n", a + 1, a + 5, a + 4);
+        let _ = writeln!(text, "f {a}/{a}/{n} {0}/{0}/{n} {1}/{1}/{n} {2}/{2}/{n}", a + 1, a + 5, a + 4);
     }
     text
 }
@@ -216,6 +218,53 @@ fn sequences(seed: u64, frames: usize) -> (usize, usize) {
         }
     }
     (read, again)
+}
+
+/// What is read of the second text by the first, which must be possible.
+fn read_again(first: &str, second: &str) -> [Arc<Geometry>; 2] {
+    let (options, library) = (ReadOptions::default(), library());
+    let first = same(first.as_bytes(), None, &options, &library).unwrap();
+    let second = same(second.as_bytes(), first.parsed.as_ref(), &options, &library).unwrap();
+    assert!(second.again);
+    [first.geometry, second.geometry]
+}
+
+#[test]
+fn what_is_the_same_is_shared() {
+    let text = exported();
+    let moved = text.replace("0.731000", "0.741000");
+    let [a, b] = read_again(&text, &moved);
+    assert_ne!(a.positions, b.positions);
+    let share = |x: &[[u32; 3]], y: &[[u32; 3]]| x.as_ptr() == y.as_ptr();
+    assert!(share(&a.triangles.0, &b.triangles.0) && a.faces.corners.as_ptr() == b.faces.corners.as_ptr());
+    let (ta, tb) = (a.texcoords.as_ref().unwrap(), b.texcoords.as_ref().unwrap());
+    assert!(share(&ta.corners.0, &tb.corners.0) && ta.values.0.as_ptr() == tb.values.0.as_ptr());
+    assert_eq!(a.normals, b.normals);
+}
+
+#[test]
+fn other_names_and_normals_leave_faces_as_they_are() {
+    let text = exported();
+    let renumbered = text
+        .replace("usemtl red", "usemtl red.001")
+        .replace("o Grid", "o Grid.001")
+        .replace("b_0001", "b_0002")
+        .replace("usemtl", "vn 0.0000 1.0000 0.0000\nusemtl")
+        .replace("/5 ", "/6 ")
+        .replace("/5\n", "/6\n");
+    let [a, b] = read_again(&text, &renumbered);
+    assert_eq!(a.triangles.0.as_ptr(), b.triangles.0.as_ptr());
+    assert_ne!(a.normals, b.normals);
+}
+
+#[test]
+fn a_quad_that_becomes_concave_is_cut_the_other_way() {
+    let convex = "v 0 0 0\nv 2 1 0\nv 4 0 0\nv 2 4 0\nf 2 3 4 1\n";
+    let [a, b] = read_again(&convex.replace("2 1 0", "2 -1 0"), &convex.replace("f 2", "f  2"));
+    assert_eq!((a.faces.hash(), a.triangles.0.len()), (b.faces.hash(), b.triangles.0.len()));
+    let notch = &convex.replace("f 2 3 4 1", "f 1 2 3 4");
+    let [a, b] = read_again(&notch.replace("2 1 0", "2 -1 0"), notch);
+    assert_ne!(a.triangles, b.triangles);
 }
 
 #[test]
