@@ -22,11 +22,13 @@ fn what_was_put_comes_back() {
     assert!(store.take_notes().is_empty());
 }
 
+/// What befalls an entry; the other one is whole.
+type Damage = dyn Fn(&Path, &Path);
+
 #[test]
 fn damage_is_told_and_given_up() {
     let (_t, store) = store(1 << 20);
     let content = b"a payload of some length".as_slice();
-    type Damage = dyn Fn(&Path, &Path);
     let damage: [&Damage; 4] = [
         &|path, _| {
             let mut bytes = fs::read(path).unwrap();
