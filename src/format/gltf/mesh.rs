@@ -358,7 +358,7 @@ fn corners(triangles: &[[u32; 3]], given: bool, is_usable: impl Fn(u32) -> bool)
     triangles.iter().map(|triangle| triangle.map(own)).collect()
 }
 
-/// Texture coordinates, turned where all maps are (KHR_texture_transform: scale, rotation, offset), v running up.
+/// Texture coordinates, turned where all maps are (`KHR_texture_transform`: scale, rotation, offset), v running up.
 fn texcoords(given: &accessor::Numbers, turn: Option<&TextureTransform>) -> Vec<[f32; 2]> {
     let angle = turn.map_or(0.0, |turn| f64::from(turn.rotation.0));
     let (sine, cosine) = (libm::sin(angle), libm::cos(angle));
