@@ -219,3 +219,53 @@ fn equal_frames_are_copied() {
     let pictures = pictures(&t.join("out"));
     assert!(pictures["f_0.png"] == pictures["f_2.png"] && pictures["f_2.png"] != pictures["f_3.png"]);
 }
+
+/// A still room and a moving figure as layers: after the first frame nothing of the room is read, uploaded or rebuilt.
+#[test]
+fn what_stands_still_costs_nothing() {
+    let t = tempfile::tempdir().unwrap();
+    let t = t.path();
+    // it moves as a whole, so that no diagonal of its quads flips
+    let figure = t.join("figure");
+    std::fs::create_dir(&figure).unwrap();
+    for frame in 0..FRAMES {
+        let text = moved(frame, |t, [x, y, z], _| [x, y + t, z]);
+        std::fs::write(figure.join(format!("f_{frame:02}.obj")), text).unwrap();
+    }
+    let room = t.join("room.obj");
+    std::fs::write(&room, moved(0, |_, [x, y, z], _| [5.0 * x, 5.0 * y, z - 3.0])).unwrap();
+    let job = t.join("job.yaml");
+    let figure_path = figure.display();
+    std::fs::write(
+        &job,
+        format!(
+            "layers:\n  - sequence: room.obj\n  - sequence: '{figure_path}'\noutput: {{size: [96, 54]}}\n"
+        ),
+    )
+    .unwrap();
+    for _ in 0..5 {
+        let r = t.join("r.json");
+        render(t, &job, "out", &["--report", r.to_str().unwrap(), "--overwrite", "--update", "refit"], 0);
+        let report = report(&r);
+        let frames = report["frames"].as_array().unwrap();
+        assert_eq!(frames.len(), FRAMES as usize);
+        let size = |path: &Path| path.metadata().unwrap().len();
+        let own =
+            |f: &serde_json::Value| size(&figure.join(format!("f_{:02}.obj", f["frame"].as_u64().unwrap())));
+        let read = |f: &serde_json::Value| f["bytes"]["read"].as_u64().unwrap();
+        // two readers begin side by side, one of them reads the room
+        let first_two: u64 = frames[..2].iter().map(read).sum();
+        assert_eq!(first_two, size(&room) + own(&frames[0]) + own(&frames[1]));
+        assert!(frames[2..].iter().all(|f| read(f) == own(f)));
+        for f in &frames[1..] {
+            // positions of the figure alone
+            assert_eq!(
+                f["bytes"]["uploaded"].as_u64().unwrap(),
+                u64::from(12 * SIDE * SIDE),
+                "{}",
+                f["bytes"]
+            );
+            assert_eq!((&f["update"]["action"], &f["change"]["same"]), (&"refit".into(), &1.into()));
+        }
+    }
+}

@@ -37,6 +37,8 @@ struct Kept {
 #[derive(Default)]
 pub struct Sources {
     kept: Mutex<HashMap<PathBuf, Kept>>,
+    /// A lock for each file that is to be kept, so that one reader loads it while others wait.
+    loading: Mutex<HashMap<PathBuf, Arc<Mutex<()>>>>,
     textures: TextureCache,
     pub(super) animations: Animations,
     /// Of each layer the frame that was read last, as its text; the layer read last stands last.
@@ -87,6 +89,11 @@ impl Sources {
         uses: bool,
     ) -> Result<(Arc<Loaded>, bool), FormatError> {
         let stamp = stamp(path);
+        let lock = keep.then(|| {
+            let mut loading = self.loading.lock().unwrap_or_else(PoisonError::into_inner);
+            Arc::clone(loading.entry(path.to_path_buf()).or_default())
+        });
+        let _alone = lock.as_ref().map(|lock| lock.lock().unwrap_or_else(PoisonError::into_inner));
         {
             let mut kept = self.kept.lock().unwrap_or_else(PoisonError::into_inner);
             if let Some(k) = kept.get_mut(path).filter(|k| k.stamp == stamp && k.options == *options) {
