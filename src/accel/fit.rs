@@ -26,6 +26,7 @@ impl Tree {
             vertex_box: Aabb::EMPTY,
             bounds: Aabb::EMPTY,
             cost: 0.0,
+            leaf_boxes: Vec::new(),
         };
         tree.refit(positions, triangles);
         tree
@@ -35,9 +36,20 @@ impl Tree {
     /// corners are taken as they are now; their number must be that which the tree was built over.
     pub fn refit(&mut self, positions: &[[f32; 3]], triangles: &[[u32; 3]]) {
         assert_eq!(triangles.len(), self.triangle_count as usize, "a tree is refitted to as many triangles");
-        let mut boxes: Vec<LeafBoxes> = Vec::new();
-        let blocks = self.blocks.par_iter_mut().with_min_len(GRAIN);
-        blocks.map(|block| fit_block(block, positions, triangles)).collect_into_vec(&mut boxes);
+        // kept from refit to refit: new memory would cost as much as filling it
+        let mut boxes = std::mem::take(&mut self.leaf_boxes);
+        boxes.resize(self.blocks.len(), Aabb::EMPTY);
+        self.vertex_box = self
+            .blocks
+            .par_iter_mut()
+            .zip(&mut boxes)
+            .with_min_len(GRAIN)
+            .map(|(block, own)| {
+                let vertex_box;
+                (*own, vertex_box) = fit_block(block, positions, triangles);
+                vertex_box
+            })
+            .reduce(|| Aabb::EMPTY, |a, b| a.union(&b));
         let mut area = 0.0;
         for level in self.levels.iter().rev() {
             let (upper, below) = self.nodes.split_at_mut(level.end);
@@ -46,7 +58,7 @@ impl Tree {
                 .map(|node| {
                     fit_node(node, |child| {
                         if child & LEAF != 0 {
-                            boxes[(child & !LEAF) as usize].0
+                            boxes[(child & !LEAF) as usize]
                         } else {
                             below[child as usize - level.end].bounds()
                         }
@@ -54,7 +66,7 @@ impl Tree {
                 })
                 .sum::<f64>();
         }
-        self.vertex_box = boxes.iter().fold(Aabb::EMPTY, |all, (_, b)| all.union(b));
+        self.leaf_boxes = boxes;
         self.bounds = self.nodes.first().map_or(Aabb::EMPTY, Node::bounds);
         let whole = half_area(&self.bounds);
         self.cost = if whole > 0.0 && area.is_finite() { area / whole } else { 0.0 };

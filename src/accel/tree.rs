@@ -60,6 +60,8 @@ pub struct Tree {
     /// The box of the root's children.
     pub(crate) bounds: Aabb,
     pub(crate) cost: f64,
+    /// The own boxes of each leaf's triangles together: room for a refit.
+    pub(crate) leaf_boxes: Vec<Aabb>,
 }
 
 /// How large a tree is.
@@ -86,6 +88,7 @@ impl Tree {
         (size_of::<Self>()
             + size_of_val(&*self.nodes)
             + size_of_val(&*self.blocks)
+            + size_of_val(&*self.leaf_boxes)
             + size_of_val(&*self.levels)) as u64
     }
 
