@@ -6,7 +6,7 @@
 //! | room | what it is for |
 //! | --- | --- |
 //! | [`cli`] | what was typed, what it means, a call below; the only room that prints |
-//! | [`run`] | a run: reader, device and writer stages, resume, events, report |
+//! | [`run`] | a run: reader, device and writer stages, resume, events, report; warm against cold |
 //! | [`device`] | the device trait, the CPU device, the fake device, the conformance suite |
 //! | [`kernel`] | camera rays, materials, lights, sampling: what one ray does |
 //! | [`plan`] | what a device must do before it can trace a frame, as a value (pure) |
@@ -15,7 +15,7 @@
 //! | [`output`] | encoders, atomic files, the records of finished frames |
 //! | [`film`] | film, AOVs, colour, comparison |
 //! | [`job`] | what is to be rendered: job file, discovery, cameras and transforms over time |
-//! | [`mod@format`] | bytes to values with diagnostics: OBJ, MTL, textures |
+//! | [`mod@format`] | bytes to values with diagnostics: OBJ, MTL, glTF, textures |
 //! | [`store`] | the cache on disk; knows bytes, not scenes |
 //! | [`scene`] | frames, parts, meshes, materials, lights, cameras: plain data |
 //! | [`math`], [`clock`], [`warning`] | the ground floor |

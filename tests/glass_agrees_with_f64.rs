@@ -1,6 +1,8 @@
 //! A prism, glass in glass, and shadows through two coloured panes, against the same pictures computed in f64 by brute
 //! force, straight from the formulas. All shading normals are the triangles' own.
 
+mod common;
+
 use rentix::device::cpu::CpuDevice;
 use rentix::device::{Device, Stop};
 use rentix::math::{DVec3, Vec3};
@@ -95,13 +97,8 @@ impl Reference<'_> {
     fn hits(&mut self, origin: DVec3, direction: DVec3, start: Option<usize>) -> Vec<(f64, usize)> {
         let mut hits = Vec::new();
         for (i, (corners, _)) in self.bodies.triangles.iter().enumerate() {
-            let [a, b, c] = *corners;
-            let (e, f) = (b - a, c - a);
-            let det = direction.cross(f).dot(e);
-            let u = direction.cross(f).dot(origin - a) / det;
-            let v = (origin - a).cross(e).dot(direction) / det;
-            let t = (origin - a).cross(e).dot(f) / det;
-            let inside = u.min(v).min(1.0 - u - v);
+            let (t, [w, u, v]) = common::meets(*corners, origin, direction);
+            let inside = u.min(v).min(w);
             if Some(i) != start && t > 1e-9 {
                 self.margin = self.margin.min(inside.abs());
                 if inside > 0.0 {

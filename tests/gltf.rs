@@ -28,7 +28,8 @@ fn vertices(gltf: &Gltf, time_s: f64) -> Vec<[f64; 3]> {
 
 #[test]
 fn poses_agree_with_numpy() {
-    let Some(folder) = option_env!("RENTIX_SCENES").map(|f| Path::new(f).join("gltf")).filter(|f| f.is_dir())
+    let Some(folder) =
+        std::env::var_os("RENTIX_SCENES").map(|f| Path::new(&f).join("gltf")).filter(|f| f.is_dir())
     else {
         eprintln!("skipped: RENTIX_SCENES names no folder with gltf/");
         return;

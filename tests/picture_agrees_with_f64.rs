@@ -1,6 +1,8 @@
 //! A picture of the CPU device against the same picture computed in f64 by brute force, straight from the formulas:
 //! loose triangles of models 0 to 2, some with shading normals, some transparent, under lights of each kind.
 
+mod common;
+
 use rentix::device::cpu::CpuDevice;
 use rentix::device::{Device, Stop};
 use rentix::math::{DVec3, Vec3};
@@ -119,16 +121,11 @@ fn hits(
 ) -> Vec<(f64, usize, [f64; 3])> {
     let mut hits: Vec<(f64, usize, [f64; 3])> = Vec::new();
     for (i, p) in patches.iter().enumerate() {
-        let [a, b, c] = p.corners;
-        let (e, f) = (b - a, c - a);
-        let det = direction.cross(f).dot(e);
-        let u = direction.cross(f).dot(origin - a) / det;
-        let v = (origin - a).cross(e).dot(direction) / det;
-        let t = (origin - a).cross(e).dot(f) / det;
-        let inside = u.min(v).min(1.0 - u - v);
+        let (t, weights) = common::meets(p.corners, origin, direction);
+        let inside = weights.into_iter().fold(f64::INFINITY, f64::min);
         margin.passes(inside);
         if inside > 0.0 && t > 1e-9 {
-            hits.push((t, i, [1.0 - u - v, u, v]));
+            hits.push((t, i, weights));
         }
     }
     hits.sort_by(|a, b| a.0.total_cmp(&b.0));

@@ -47,6 +47,8 @@ fn pictures_are_the_same_whatever_the_store_holds() {
     let input = scene(t);
     let store = t.join("store");
     let (without, _) = shown(t, &input, "without", &["--no-cache"]);
+    let texel = image::load_from_memory(&without["wave_0001.png"]).unwrap().into_rgb8();
+    assert!(texel.pixels().any(|p| p.0 != texel.get_pixel(0, 0).0), "nothing is seen");
     assert!(entries(&store).is_empty(), "--no-cache keeps something");
     assert!(shown(t, &input, "cold", &["--cold"]).0 == without && entries(&store).is_empty());
 

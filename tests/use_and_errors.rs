@@ -2,6 +2,7 @@
 
 mod common;
 use common::{pictures, render, report, run, wave};
+use std::fmt::Write as _;
 
 #[test]
 fn wrong_use_ends_in_2_and_writes_nothing() {
@@ -106,4 +107,25 @@ fn render_farms_read_progress() {
     ] {
         assert_eq!(render(t, &input, kind, &["--size", "32x18", "--progress", kind], 0).stdout, lines);
     }
+}
+
+/// Nine panes of refracting glass, each entered and none left.
+#[test]
+fn media_that_are_too_deep_are_told_of() {
+    let t = tempfile::tempdir().unwrap();
+    let t = t.path();
+    let (mut obj, mut mtl) = ("mtllib p.mtl\n".to_string(), String::new());
+    for i in 0..9 {
+        let z = -0.1 * f64::from(i);
+        writeln!(obj, "v -9 -9 {z}\nv 9 -9 {z}\nv 0 9 {z}\nusemtl m{i}\nf -3 -2 -1").unwrap();
+        writeln!(mtl, "newmtl m{i}\nNi 1.{}\nillum 6\nKs 0 0 0", i + 1).unwrap();
+    }
+    std::fs::write(t.join("p.mtl"), mtl).unwrap();
+    std::fs::write(t.join("p.obj"), obj).unwrap();
+    let view = ["--size", "8x8", "--eye", "0,0,5", "--look-at", "0,0,0", "--fov", "5"];
+    let said = render(t, &t.join("p.obj"), "out", &view, 0).stderr;
+    assert!(
+        said.contains("p.obj") && said.contains("more than 8 media") && said.contains("(64 times)"),
+        "{said}"
+    );
 }

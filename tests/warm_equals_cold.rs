@@ -167,6 +167,8 @@ fn hostile_sequences_by_processes_of_their_own() {
         refit.push(r.to_string_lossy().into_owned());
         let warm = render_to("warm", refit);
         assert_eq!(warm.len(), FRAMES as usize);
+        let shown: std::collections::BTreeSet<_> = warm.values().collect();
+        assert!(shown.len() > 1, "{name}: all frames show the same");
         assert!(warm == render_to("cold", with(&["--cold"])), "{name}: cold differs");
         let alone = render_to("alone", with(&["--frames", "5"]));
         assert_eq!(alone["f_05.png"], warm["f_05.png"], "{name}: a frame alone differs");
@@ -192,6 +194,7 @@ fn nan_in_one_frame() {
     assert!(said.contains("f_03.obj") && said.contains("--frames 3"), "{said}");
     render(t, &folder, "cold", &["--size", "96x54", "--cold"], 1);
     assert!(pictures(&t.join("warm")) == pictures(&t.join("cold")));
+    assert!(pictures(&t.join("warm"))["f_02.png"] != pictures(&t.join("warm"))["f_04.png"]);
     assert_eq!(pictures(&t.join("warm")).len(), FRAMES as usize - 1);
     let told = run(t, ["verify", folder.to_str().unwrap(), "--size", "96x54"]);
     assert!(told.status == 0 && told.stderr.contains("1 failed in every way alike"), "{}", told.stderr);

@@ -57,9 +57,9 @@ pub(super) fn run_options(args: &RenderArgs) -> RunOptions {
     }
 }
 
-/// The store asked for; a run that forgets everything between frames has none.
+/// The store asked for.
 fn store_of(args: &RenderArgs) -> Option<Arc<Store>> {
-    if args.no_cache || args.cold { None } else { store(args.cache.as_deref()) }
+    if args.no_cache { None } else { store(args.cache.as_deref()) }
 }
 
 /// The device asked for.

@@ -122,9 +122,8 @@ pub fn scan_bounds(path: &Path) -> Result<Bounds, FormatError> {
     Ok(bounds)
 }
 
-/// The libraries that an OBJ names and the maps of all materials, as far as they are there; the buffers and images
-/// of a glTF. The shape is not
-/// read, and what cannot be read names nothing: this is for what must not be written over.
+/// The libraries that an OBJ names and the maps of all materials, as far as they are there; the buffers and images of a
+/// glTF. The shape is not read, and what cannot be read names nothing: this is for what must not be written over.
 pub fn named_files(path: &Path, options: &ReadOptions) -> Vec<PathBuf> {
     if is_gltf(path) {
         return gltf::named_files(path);

@@ -206,6 +206,8 @@ pub struct UpdatePlan {
     pub part_bytes: u64,
     /// What builds and refits are expected to take, ms.
     pub predicted_ms: f64,
+    /// Whether everything was to be forgotten first.
+    pub is_cold: bool,
 }
 
 impl UpdatePlan {
@@ -303,5 +305,12 @@ pub fn plan_frame(frame: &Frame, residency: &Residency, wishes: &Wishes) -> Upda
         (Action::None, format!("{} of {} trees resident", trees.len(), trees.len()))
     };
     why.insert(0, what);
-    UpdatePlan { steps, action, why: why.join("; "), part_bytes: needed.values().sum(), predicted_ms }
+    UpdatePlan {
+        steps,
+        action,
+        why: why.join("; "),
+        part_bytes: needed.values().sum(),
+        predicted_ms,
+        is_cold: *cold,
+    }
 }

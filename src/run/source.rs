@@ -43,14 +43,8 @@ pub struct Sources {
     pub(super) animations: Animations,
     /// Of each layer the frame that was read last, as its text; the layer read last stands last.
     latest: Mutex<Vec<(PathBuf, Arc<Parsed>)>>,
-    /// What makes a run cold: nothing is kept for later frames.
-    cold: Option<Cold>,
-}
-
-/// What a cold run makes its texture caches of.
-#[derive(Clone, Copy)]
-struct Cold {
-    texture_bytes: Option<u64>,
+    /// Whether nothing is kept for later frames.
+    cold: bool,
 }
 
 impl Sources {
@@ -60,7 +54,7 @@ impl Sources {
         Self {
             textures: TextureCache::new(texture_bytes, store),
             animations: Animations::with_limit(texture_bytes),
-            cold: cold.then_some(Cold { texture_bytes }),
+            cold,
             ..Self::default()
         }
     }
@@ -78,7 +72,7 @@ impl Sources {
         options: &ReadOptions,
         still: bool,
     ) -> Result<(Arc<Loaded>, bool), FormatError> {
-        self.get(path, options, still && self.cold.is_none(), true)
+        self.get(path, options, still && !self.cold, true)
     }
 
     fn get(
@@ -105,11 +99,10 @@ impl Sources {
                 return Ok(found);
             }
         }
-        let loaded = Arc::new(match self.cold {
-            Some(Cold { texture_bytes }) => {
-                format::load_obj(path, options, &TextureCache::new(texture_bytes, None))?
-            }
-            None => self.load_warm(path, options)?,
+        let loaded = Arc::new(if self.cold {
+            format::load_obj(path, options, &self.textures.emptied())?
+        } else {
+            self.load_warm(path, options)?
         });
         if keep {
             let entry = Kept { stamp, options: options.clone(), loaded: Arc::clone(&loaded), used: uses };

@@ -10,10 +10,13 @@ use crate::clock::Stopwatch;
 use crate::device::{Device, DeviceError, Stop};
 use crate::diff::changes;
 use crate::film::Film;
+use crate::kernel::media::MEDIA_MAX;
 use crate::plan::{Action, Update, Wishes, plan_frame};
 use crate::scene::{Frame, PartHash};
+use crate::warning::Warnings;
 use std::collections::BTreeMap;
 use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::path::Path;
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, Sender, SyncSender};
 
@@ -38,6 +41,7 @@ pub(super) fn device_stage(
         learned: Learned::new(),
         frames_left: frames as u64,
         forget: false,
+        warnings: Warnings::default(),
     };
     let mut waiting = BTreeMap::new();
     let mut turn = 0;
@@ -56,6 +60,9 @@ pub(super) fn device_stage(
                 Ok(mut read) => Some((stage.frame(&mut read, stop), read)),
             };
             flight.give_bytes(bytes);
+            if !stage.warnings.is_empty() {
+                let _ = note.send(Note::Warnings(std::mem::take(&mut stage.warnings)));
+            }
             let Some((film, mut read)) = traced else { continue };
             match film {
                 Ok((film, status)) => {
@@ -86,6 +93,8 @@ struct DeviceStage<'a> {
     frames_left: u64,
     /// Whether what the device holds is not to be trusted, because it panicked.
     forget: bool,
+    /// What is to be told of the frame.
+    warnings: Warnings,
 }
 
 /// A frame and what came of it.
@@ -148,6 +157,12 @@ impl DeviceStage<'_> {
         report.updated(&plan, &cost);
         let traced = self.device.trace(&read.frame, &read.shot, stop)?;
         self.learned.frame(&cost, traced.trace_ms);
+        if traced.rays.media_ignored > 0 {
+            let text =
+                format!("rays entered more than {MEDIA_MAX} media one in another; deeper ones are ignored");
+            let source = Path::new(&report.source);
+            self.warnings.add_times(Some(source), None, text, traced.rays.media_ignored);
+        }
         report.rays = traced.rays.into();
         report.ms.trace = Some(traced.trace_ms);
         report.ms.readback = traced.readback_ms;

@@ -1,6 +1,7 @@
 //! What the tests through the binary share: running it, made sequences, pictures by their bytes.
 #![allow(dead_code, unreachable_pub, reason = "each test file uses its own share")]
 
+use rentix::math::DVec3;
 use std::collections::BTreeMap;
 use std::ffi::OsStr;
 use std::fmt::Write as _;
@@ -49,6 +50,17 @@ pub fn start(store: &Path, input: &Path, out: &str, more: &[&str]) -> Child {
     let mut command = rentix(store);
     command.arg("render").arg(input).arg("-o").arg(store.join(out)).args(more);
     command.stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap()
+}
+
+/// Where a ray meets a triangle's plane, in f64 (Möller and Trumbore 1997): the distance in units of its direction's
+/// length, and the weights of the corners there, of which one is negative outside. NaN where it runs along the plane.
+pub fn meets([a, b, c]: [DVec3; 3], origin: DVec3, direction: DVec3) -> (f64, [f64; 3]) {
+    let (e, f) = (b - a, c - a);
+    let det = direction.cross(f).dot(e);
+    let u = direction.cross(f).dot(origin - a) / det;
+    let v = (origin - a).cross(e).dot(direction) / det;
+    let t = (origin - a).cross(e).dot(f) / det;
+    (t, [1.0 - u - v, u, v])
 }
 
 /// The report as JSON.

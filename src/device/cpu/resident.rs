@@ -78,7 +78,7 @@ impl Resident {
                 Step::Build { tree: name, object, .. } => {
                     let Some(object) = frame.objects.get(object) else { continue };
                     // those of later frames come in any number, and are hardly asked for again
-                    let store = self.store.clone().filter(|_| plan.action == Action::Load);
+                    let store = self.store.clone().filter(|_| plan.action == Action::Load && !plan.is_cold);
                     self.build(name, &object.geometry, store.as_deref(), pool, device, &mut cost)?;
                 }
             }

@@ -13,9 +13,9 @@
 //! | normalTexture | norm |
 //! | `KHR_texture_transform` | scale and offset of the map; where all textures of a material are turned alike, texture coordinates are |
 //!
-//! What has no word is named once: textures of one material that are turned differently, `normalTexture.scale`, occlusion, texture coordinates other than
-//! the first. Without effect are doubleSided (all surfaces have two sides) and the filters of samplers (ours are
-//! trilinear).
+//! What has no word is named once: textures of one material that are turned differently, `normalTexture.scale`,
+//! occlusion, texture coordinates other than the first. Without effect are doubleSided (all surfaces have two sides) and
+//! the filters of samplers (ours are trilinear).
 
 use super::Cause;
 use super::file::File;

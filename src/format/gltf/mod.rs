@@ -230,19 +230,6 @@ impl Gltf {
         Ok(Content { clips, nodes, shapes, skins })
     }
 
-    /// The names of all clips; the place of one without a name.
-    pub fn clip_names(&self) -> impl Iterator<Item = &str> {
-        self.content.clips.iter().map(|clip| clip.name.as_str())
-    }
-
-    /// The greatest time of the keys of those clips, seconds; 0 where none plays.
-    ///
-    /// # Errors
-    /// Where there is no such clip.
-    pub fn duration_s(&self, choice: &ClipChoice) -> Result<f64, FormatError> {
-        Ok(clip::duration_s(&self.content.clips, &self.chosen(choice)?))
-    }
-
     fn chosen(&self, choice: &ClipChoice) -> Result<Vec<usize>, FormatError> {
         clip::chosen(&self.content.clips, choice).map_err(|cause| cause.at(&self.file.path))
     }

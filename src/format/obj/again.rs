@@ -25,14 +25,6 @@ pub struct Parsed {
     pub(super) known: Known,
 }
 
-impl Parsed {
-    /// Bytes that it keeps in memory besides the shape.
-    pub fn bytes(&self) -> u64 {
-        let indices = self.known.texcoords.len() + self.known.normals.len();
-        (self.bytes.len() + 4 * indices + size_of_val(self.known.runs.as_slice())) as u64
-    }
-}
-
 /// Reads a text that has the faces of `before`, whatever materials they have. The lists of faces stay empty but for
 /// the normals' indices, which are settled. None where there is anything that [`Known`] cannot describe.
 pub(super) fn scan_again<'a>(text: &'a [u8], before: &Parsed) -> Option<Scan<'a>> {

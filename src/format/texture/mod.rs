@@ -77,6 +77,12 @@ impl TextureCache {
         Self { limit_bytes, store, ..Self::default() }
     }
 
+    /// One with the same limit that holds nothing and has no store.
+    #[must_use]
+    pub fn emptied(&self) -> Self {
+        Self::new(self.limit_bytes, None)
+    }
+
     /// The textures in those files, each decoded where it is not held. `obj` is what they are loaded for.
     ///
     /// # Errors

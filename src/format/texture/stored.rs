@@ -21,13 +21,10 @@ pub(super) fn key(file: &[u8], texture_use: TextureUse) -> Key {
 }
 
 pub(super) fn put(store: &Store, key: Key, texture: &Texture) {
-    let flags = |a: bool, b: bool, c: bool| u32::from(a) | u32::from(b) << 1 | u32::from(c) << 2;
     let is_float = matches!(texture.texels, Texels::F32(_));
-    let head = [
-        texture.size[0],
-        texture.size[1],
-        flags(texture.space == TexelSpace::Srgb, texture.alpha_varies, is_float),
-    ];
+    let flags = [texture.space == TexelSpace::Srgb, texture.alpha_varies, is_float];
+    let flags = flags.iter().rev().fold(0, |bits, &flag| bits << 1 | u32::from(flag));
+    let head = [texture.size[0], texture.size[1], flags];
     let texels: &[u8] = match &texture.texels {
         Texels::U8(t) => bytemuck::cast_slice(t),
         Texels::F32(t) => bytemuck::cast_slice(t),
@@ -36,7 +33,7 @@ pub(super) fn put(store: &Store, key: Key, texture: &Texture) {
     store.put(KIND, key, &[head.as_flattened(), texels]);
 }
 
-/// The texture and the bytes of its texels; None where the store has none, or one of another form.
+/// The texture that was put; None where the store has none, or one of another form.
 pub(super) fn get(store: &Store, key: Key) -> Option<Texture> {
     let bytes = store.get(KIND, key)?;
     let (head, texels) = bytes.split_at_checked(HEAD_BYTES)?;

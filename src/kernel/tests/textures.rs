@@ -1,6 +1,7 @@
 //! Maps as pixels show them.
 
 use super::*;
+use crate::kernel::texture::tests::map;
 use crate::scene::{Map, Texcoords, TexelSpace, Texels, Texture, Textures};
 
 /// A texture of 64 × 64 texels whose levels are each of one value: 0, 1, 2 …
@@ -14,18 +15,6 @@ fn levels() -> Texture {
         space: TexelSpace::Linear,
         alpha_varies: false,
         texels: Texels::F32(texels.collect()),
-    }
-}
-
-fn map(texture: Texture) -> Map {
-    Map {
-        texture: Part::new(texture),
-        scale: [1.0; 2],
-        offset: [0.0; 2],
-        clamp: false,
-        base_gain: [0.0, 1.0],
-        bump_multiplier: 1.0,
-        channel: None,
     }
 }
 
