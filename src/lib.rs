@@ -6,6 +6,7 @@
 //! | room | what it is for |
 //! | --- | --- |
 //! | [`cli`] | what was typed, what it means, a call below; the only room that prints |
+//! | [`mod@bench`] | workloads, timing, peers, charts |
 //! | [`run`] | a run: reader, device and writer stages, resume, events, report; warm against cold |
 //! | [`device`] | the device trait, the CPU device, the fake device, the conformance suite |
 //! | [`kernel`] | camera rays, materials, lights, sampling: what one ray does |
@@ -25,6 +26,7 @@
 //! never of the tree, so that a warm picture is the cold one, byte for byte.
 
 pub mod accel;
+pub mod bench;
 pub mod cli;
 pub mod clock;
 pub mod device;

@@ -35,7 +35,7 @@ const PURE: &[&str] = &["plan", "diff", "schedule", "kernel", "scene"];
 
 const ONE_PLACE: &[OnePlace] = &[
     OnePlace {
-        rule: "only output, store, run and watch write files",
+        rule: "only output, store, run and watch write files; bench makes scenes",
         names: &[
             "std::fs::write",
             "std::fs::rename",
@@ -51,11 +51,11 @@ const ONE_PLACE: &[OnePlace] = &[
             "std::os::unix::fs::symlink",
             "tempfile",
         ],
-        places: Places::Only(&["output", "store", "run", "watch"]),
+        places: Places::Only(&["output", "store", "run", "watch", "bench"]),
     },
     OnePlace {
         // The machine tells about itself in files; a frame is known by its files before it is read.
-        rule: "only format, job, output and store read files (run/machine and run/source: facts, no scenes)",
+        rule: "only format, job, output and store read files (run/machine and run/source: facts, no scenes; bench: texts to move)",
         names: &[
             "std::fs::read*",
             "std::fs::File::open",
@@ -64,15 +64,16 @@ const ONE_PLACE: &[OnePlace] = &[
             "std::fs::canonicalize",
             "memmap2",
         ],
-        places: Places::Only(&["format", "job", "output", "store", "run/machine", "run/source"]),
+        places: Places::Only(&["format", "job", "output", "store", "run/machine", "run/source", "bench"]),
     },
     OnePlace { rule: "only accel names obvhs", names: &["obvhs"], places: Places::Only(&["accel"]) },
     OnePlace { rule: "only job reads YAML", names: &["serde_yaml"], places: Places::Only(&["job"]) },
     OnePlace {
-        rule: "only format reads OBJ by another crate, for comparison",
+        rule: "only bench reads OBJ by another crate, for comparison",
         names: &["tobj"],
-        places: Places::Only(&["format"]),
+        places: Places::Only(&["bench"]),
     },
+    OnePlace { rule: "only bench draws charts", names: &["plotters"], places: Places::Only(&["bench"]) },
     OnePlace { rule: "only format reads glTF", names: &["gltf"], places: Places::Only(&["format"]) },
     OnePlace {
         rule: "only output knows picture formats; format decodes textures",

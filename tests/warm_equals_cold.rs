@@ -3,140 +3,39 @@
 
 mod common;
 use common::{pictures, render, report, run};
+use rentix::bench::sequences::{HOSTILE, Hostile};
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
 const FRAMES: u32 = 8;
 const SIDE: u32 = 13;
 
-/// Numbers in [0, 1).
-struct Random(u64);
-
-impl Random {
-    fn next(&mut self) -> f64 {
-        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        (self.0 >> 40) as f64 / 16_777_216.0
-    }
-}
-
-/// A point of a wavy sheet.
-fn sheet(i: u32, j: u32) -> [f64; 3] {
-    let [x, y] = [i, j].map(|k| 2.0 * f64::from(k) / f64::from(SIDE - 1) - 1.0);
-    [x, y, 0.3 * (4.0 * x).sin() * (3.0 * y).cos()]
-}
-
-/// The sheet in each frame, its points moved.
-fn moved(frame: u32, place: impl Fn(f64, [f64; 3], u32) -> [f64; 3]) -> String {
+/// A sheet of SIDE² points in each frame, moved.
+fn moved(frame: u32, place: impl Fn(f64, [f64; 3]) -> [f64; 3]) -> String {
     let t = f64::from(frame) / f64::from(FRAMES - 1);
     let mut text = String::new();
-    for j in 0..SIDE {
-        for i in 0..SIDE {
-            let [x, y, z] = place(t, sheet(i, j), j * SIDE + i);
-            let _ = writeln!(text, "v {x} {y} {z}");
-        }
+    for i in 0..SIDE * SIDE {
+        let [x, y] = [i % SIDE, i / SIDE].map(|k| 2.0 * f64::from(k) / f64::from(SIDE - 1) - 1.0);
+        let [x, y, z] = place(t, [x, y, 0.3 * (4.0 * x).sin() * (3.0 * y).cos()]);
+        let _ = writeln!(text, "v {x} {y} {z}");
     }
-    faces(&mut text, 0);
+    for i in (0..SIDE * (SIDE - 1)).filter(|i| i % SIDE < SIDE - 1) {
+        let _ = writeln!(text, "f {} {} {} {}", i + 1, i + 2, i + SIDE + 2, i + SIDE + 1);
+    }
     text
 }
 
-fn faces(text: &mut String, before: u32) {
-    for j in 0..SIDE - 1 {
-        for i in 0..SIDE - 1 {
-            let a = before + j * SIDE + i + 1;
-            let _ = writeln!(text, "f {a} {} {} {}", a + 1, a + SIDE + 1, a + SIDE);
-        }
-    }
-}
-
-/// The frames of each sequence.
-fn text(name: &str, frame: u32) -> String {
-    let mut random = Random(u64::from(frame));
-    match name {
-        "random places" => {
-            let mut text = String::new();
-            for _ in 0..SIDE * SIDE {
-                let [x, y, z] = [0; 3].map(|_| 2.0 * random.next() - 1.0);
-                let _ = writeln!(text, "v {x} {y} {z}");
-            }
-            faces(&mut text, 0);
-            text
-        }
-        "explosion" => moved(frame, |t, [x, y, z], i| {
-            let far = 1.0 + 20.0 * t * f64::from(i % 7);
-            [x * far, y * far, z * far]
-        }),
-        "bodies that swap places" => moved(frame, |t, [x, y, z], i| {
-            let side = if i % SIDE < SIDE / 2 { 1.0 } else { -1.0 };
-            [x + side * 2.0 * t, y + side * (std::f64::consts::PI * t).sin(), z]
-        }),
-        "twist" => moved(frame, |t, [x, y, z], _| {
-            let (sin, cos) = (20.0 * std::f64::consts::TAU * t * y).sin_cos();
-            [x * cos - z * sin, y, x * sin + z * cos]
-        }),
-        "collapse and back" => moved(frame, |t, p, _| p.map(|x| x * (2.0 * t - 1.0).abs().max(0.0))),
-        "to a point" => moved(frame, |t, p, _| if t < 0.5 { p } else { [0.5, 0.5, 0.5] }),
-        "inflation" => moved(frame, |t, p, _| p.map(|x| x * 1e6_f64.powf(t))),
-        "duplicates" => {
-            moved(frame, |t, [x, y, z], i| if i % 3 == 0 { [0.0, t, 0.0] } else { [x, y + t, z] })
-        }
-        "nothing, something, nothing" if (3..6).contains(&frame) => moved(frame, |_, p, _| p),
-        "nothing, something, nothing" => "v 0 0 0\n".to_string(),
-        "new topology" => {
-            let mut text = moved(frame, |_, p, _| p);
-            for _ in 0..5 + frame {
-                let corner = |random: &mut Random| 1 + (random.next() * f64::from(SIDE * SIDE)) as u32;
-                let [a, b, c] = [0; 3].map(|_| corner(&mut random));
-                let _ = writeln!(text, "f {a} {b} {c}");
-            }
-            text
-        }
-        "meshes that come and go" => {
-            let mut text = String::new();
-            for k in (0..4).filter(|k| (frame >> k) & 1 == 1 || *k == 3) {
-                let count = text.matches("v ").count() as u32;
-                let _ = writeln!(text, "o {k}");
-                for j in 0..SIDE {
-                    for i in 0..SIDE {
-                        let [x, y, z] = sheet(i, j);
-                        let _ = writeln!(text, "v {} {y} {}", x + f64::from(k), z + 0.1 * f64::from(frame));
-                    }
-                }
-                faces(&mut text, count);
-            }
-            text
-        }
-        other => unreachable!("{other}"),
-    }
-}
-
-const SEQUENCES: [&str; 11] = [
-    "random places",
-    "explosion",
-    "bodies that swap places",
-    "twist",
-    "collapse and back",
-    "to a point",
-    "inflation",
-    "duplicates",
-    "nothing, something, nothing",
-    "new topology",
-    "meshes that come and go",
-];
-
-fn write(folder: &Path, name: &str) -> PathBuf {
-    let folder = folder.join(name);
-    std::fs::create_dir_all(&folder).unwrap();
-    for frame in 0..FRAMES {
-        std::fs::write(folder.join(format!("f_{frame:02}.obj")), text(name, frame)).unwrap();
-    }
+fn write(folder: &Path, hostile: &Hostile) -> PathBuf {
+    let folder = folder.join(hostile.name);
+    hostile.write(SIDE, FRAMES, &folder).unwrap();
     folder
 }
 
 #[test]
 fn hostile_sequences_by_verify() {
     let t = tempfile::tempdir().unwrap();
-    for name in SEQUENCES {
-        let folder = write(t.path(), name);
+    for hostile in HOSTILE {
+        let (name, folder) = (hostile.name, write(t.path(), &hostile));
         for update in ["auto", "refit", "rebuild"] {
             let args = ["verify", folder.to_str().unwrap(), "--size", "96x54", "--update", update, "--json"];
             let told = run(t.path(), args);
@@ -152,8 +51,8 @@ fn hostile_sequences_by_verify() {
 fn hostile_sequences_by_processes_of_their_own() {
     let t = tempfile::tempdir().unwrap();
     let t = t.path();
-    for name in SEQUENCES {
-        let folder = write(t, name);
+    for hostile in HOSTILE {
+        let (name, folder) = (hostile.name, write(t, &hostile));
         let (r, size) = (t.join(format!("{name}.json")), ["--size", "96x54"]);
         let with = |more: &[&'static str]| -> Vec<String> {
             size.iter().chain(more).map(ToString::to_string).collect()
@@ -171,14 +70,12 @@ fn hostile_sequences_by_processes_of_their_own() {
         assert!(shown.len() > 1, "{name}: all frames show the same");
         assert!(warm == render_to("cold", with(&["--cold"])), "{name}: cold differs");
         let alone = render_to("alone", with(&["--frames", "5"]));
-        assert_eq!(alone["f_05.png"], warm["f_05.png"], "{name}: a frame alone differs");
+        assert_eq!(alone["f_0005.png"], warm["f_0005.png"], "{name}: a frame alone differs");
         let report = report(&r);
         let actions: Vec<_> =
             report["frames"].as_array().unwrap().iter().map(|f| &f["update"]["action"]).collect();
         let is_warm = actions[1..].iter().all(|a| **a == "refit" || **a == "none");
-        let keeps_its_faces =
-            !["nothing, something, nothing", "new topology", "meshes that come and go"].contains(&name);
-        assert_eq!(is_warm, keeps_its_faces, "{name}: {actions:?}");
+        assert_eq!(is_warm, hostile.keeps_its_faces, "{name}: {actions:?}");
     }
 }
 
@@ -187,14 +84,15 @@ fn hostile_sequences_by_processes_of_their_own() {
 fn nan_in_one_frame() {
     let t = tempfile::tempdir().unwrap();
     let t = t.path();
-    let folder = write(t, "twist");
-    let bad = folder.join("f_03.obj");
+    let twist = HOSTILE.into_iter().find(|h| h.name == "twist").unwrap();
+    let folder = write(t, &twist);
+    let bad = folder.join("f_0003.obj");
     std::fs::write(&bad, std::fs::read_to_string(&bad).unwrap().replacen("v ", "v nan ", 5)).unwrap();
     let said = render(t, &folder, "warm", &["--size", "96x54", "--update", "refit"], 1).stderr;
-    assert!(said.contains("f_03.obj") && said.contains("--frames 3"), "{said}");
+    assert!(said.contains("f_0003.obj") && said.contains("--frames 3"), "{said}");
     render(t, &folder, "cold", &["--size", "96x54", "--cold"], 1);
     assert!(pictures(&t.join("warm")) == pictures(&t.join("cold")));
-    assert!(pictures(&t.join("warm"))["f_02.png"] != pictures(&t.join("warm"))["f_04.png"]);
+    assert!(pictures(&t.join("warm"))["f_0002.png"] != pictures(&t.join("warm"))["f_0004.png"]);
     assert_eq!(pictures(&t.join("warm")).len(), FRAMES as usize - 1);
     let told = run(t, ["verify", folder.to_str().unwrap(), "--size", "96x54"]);
     assert!(told.status == 0 && told.stderr.contains("1 failed in every way alike"), "{}", told.stderr);
@@ -207,11 +105,11 @@ fn equal_frames_are_copied() {
     let t = t.path();
     let folder = t.join("w");
     std::fs::create_dir(&folder).unwrap();
-    let still = moved(0, |_, p, _| p);
+    let still = moved(0, |_, p| p);
     for (frame, head) in ["o a\n", "o b\n", "# c\n"].iter().enumerate() {
         std::fs::write(folder.join(format!("f_{frame}.obj")), format!("{head}{still}")).unwrap();
     }
-    std::fs::write(folder.join("f_3.obj"), moved(3, |t, [x, y, z], _| [x, y + t, z])).unwrap();
+    std::fs::write(folder.join("f_3.obj"), moved(3, |t, [x, y, z]| [x, y + t, z])).unwrap();
     let r = t.join("r.json");
     render(t, &folder, "out", &["--size", "96x54", "--report", r.to_str().unwrap()], 0);
     let report = report(&r);
@@ -232,11 +130,11 @@ fn what_stands_still_costs_nothing() {
     let figure = t.join("figure");
     std::fs::create_dir(&figure).unwrap();
     for frame in 0..FRAMES {
-        let text = moved(frame, |t, [x, y, z], _| [x, y + t, z]);
+        let text = moved(frame, |t, [x, y, z]| [x, y + t, z]);
         std::fs::write(figure.join(format!("f_{frame:02}.obj")), text).unwrap();
     }
     let room = t.join("room.obj");
-    std::fs::write(&room, moved(0, |_, [x, y, z], _| [5.0 * x, 5.0 * y, z - 3.0])).unwrap();
+    std::fs::write(&room, moved(0, |_, [x, y, z]| [5.0 * x, 5.0 * y, z - 3.0])).unwrap();
     let job = t.join("job.yaml");
     let figure_path = figure.display();
     std::fs::write(

@@ -1,5 +1,6 @@
 //! What was typed, what it means, a call below; the only room that prints.
 
+mod bench;
 mod cache;
 mod compare;
 mod completions;
@@ -88,6 +89,11 @@ enum Command {
         after_help = "Example: rentix compare out/a out/b --flip 0.005\n\nExit status: 0 equal (or within --flip), 1 they differ, 2 unreadable."
     )]
     Compare(compare::CompareArgs),
+    /// Measures how fast things are, beside other programs where they are installed
+    #[command(
+        after_help = "Example: rentix bench updates --scenes scenes/ -o bench\n\nTables go to stdout; tables as JSON and charts to the folder."
+    )]
+    Bench(bench::BenchArgs),
     /// Tells what is in the store on disk, or removes of it
     #[command(after_help = "Example: rentix cache stat")]
     Cache(cache::CacheArgs),
@@ -119,6 +125,7 @@ pub fn main() -> ExitCode {
         Command::Verify(args) => verify::verify(args, &cli.global),
         Command::Inspect(args) => inspect::inspect(args, &cli.global),
         Command::Compare(args) => compare::compare(args, &cli.global),
+        Command::Bench(args) => bench::bench(args, &cli.global),
         Command::Cache(args) => cache::cache(args, &cli.global),
         Command::Devices => devices::devices(&cli.global),
         Command::Completions { shell } => Ok(completions::completions(*shell)),

@@ -1,0 +1,147 @@
+//! Charts as SVG: lines over the frames of a sequence, in panels one above the other.
+
+use plotters::coord::Shift;
+use plotters::coord::ranged1d::{Ranged, ValueFormatter};
+use plotters::coord::types::RangedCoordf64;
+use plotters::element::PathElement;
+use plotters::prelude::{
+    BLACK, Cartesian2d, ChartBuilder, ChartContext, Color, DrawingArea, IntoDrawingArea, IntoLogRange,
+    LineSeries, RGBColor, SVGBackend, SeriesLabelPosition, WHITE,
+};
+use std::error::Error;
+
+/// Named points.
+#[derive(Clone, Debug)]
+pub(super) struct Line {
+    /// Its name.
+    pub(super) name: String,
+    /// Its points, by x.
+    pub(super) points: Vec<(f64, f64)>,
+}
+
+/// Lines over the same axes.
+#[derive(Clone, Debug)]
+pub(super) struct Panel {
+    /// What y is, with its unit.
+    pub(super) y: String,
+    /// Whether y is logarithmic.
+    pub(super) is_log: bool,
+    /// The lines.
+    pub(super) lines: Vec<Line>,
+}
+
+/// Panels over the same frames.
+#[derive(Clone, Debug)]
+pub(super) struct Chart {
+    /// Its file name without extension.
+    pub(super) name: String,
+    /// What stands above.
+    pub(super) title: String,
+    /// The panels.
+    pub(super) panels: Vec<Panel>,
+}
+
+const SIZE: (u32, u32) = (900, 620);
+const FONT: &str = "sans-serif";
+/// Okabe and Ito's palette, which people with any colour vision can tell apart.
+const COLORS: [RGBColor; 4] =
+    [RGBColor(0, 114, 178), RGBColor(230, 159, 0), RGBColor(0, 158, 115), RGBColor(204, 121, 167)];
+/// Widths of lines: where they lie on each other, those below look out.
+const WIDTHS: [u32; 4] = [2, 6, 4, 2];
+
+impl Chart {
+    /// The chart as SVG.
+    pub(super) fn svg(&self) -> Result<String, String> {
+        let mut svg = String::new();
+        self.draw(&mut svg).map_err(|e| e.to_string())?;
+        Ok(svg)
+    }
+
+    fn draw(&self, svg: &mut String) -> Result<(), Box<dyn Error>> {
+        let root = SVGBackend::with_string(svg, SIZE).into_drawing_area();
+        root.fill(&WHITE)?;
+        let root = root.titled(&self.title, (FONT, 22))?;
+        for (area, panel) in root.split_evenly((self.panels.len(), 1)).iter().zip(&self.panels) {
+            panel.draw(area)?;
+        }
+        root.present()?;
+        Ok(())
+    }
+}
+
+type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
+
+impl Panel {
+    fn draw(&self, area: &Area<'_>) -> Result<(), Box<dyn Error>> {
+        let points = || self.lines.iter().flat_map(|line| line.points.iter());
+        let least = points().map(|p| p.1).fold(f64::INFINITY, f64::min);
+        let greatest = points().map(|p| p.1).fold(f64::NEG_INFINITY, f64::max);
+        let last = points().map(|p| p.0).fold(1.0, f64::max);
+        // the names stand beside the lines
+        let x = 1.0..(last.max(2.0) - 1.0) * 1.14 + 1.0;
+        let mut builder = ChartBuilder::on(area);
+        builder.margin(12).x_label_area_size(36).y_label_area_size(64);
+        if self.is_log {
+            let [low, high] = [least.min(1.0) / 1.1, greatest.max(1.0) * 1.1];
+            self.lines_on(builder.build_cartesian_2d(x, (low.max(1e-9)..high).log_scale())?)
+        } else {
+            self.lines_on(builder.build_cartesian_2d(x, 0.0..greatest.max(1e-9) * 1.1)?)
+        }
+    }
+
+    fn lines_on<'a, Y>(
+        &self,
+        mut chart: ChartContext<'a, SVGBackend<'a>, Cartesian2d<RangedCoordf64, Y>>,
+    ) -> Result<(), Box<dyn Error>>
+    where
+        Y: Ranged<ValueType = f64> + ValueFormatter<f64>,
+    {
+        chart
+            .configure_mesh()
+            .light_line_style(WHITE.mix(0.0))
+            .x_desc("frame")
+            .x_label_formatter(&|x| format!("{x:.0}"))
+            .y_desc(&self.y)
+            .label_style((FONT, 13))
+            .draw()?;
+        let drawn = (1..self.lines.len()).chain(0..self.lines.len().min(1));
+        for i in drawn {
+            let style = COLORS[i % COLORS.len()].stroke_width(WIDTHS[i % WIDTHS.len()]);
+            let points = self.lines[i].points.iter().copied();
+            chart
+                .draw_series(LineSeries::new(points, style))?
+                .label(&self.lines[i].name)
+                .legend(move |(x, y)| PathElement::new(vec![(x, y), (x + 18, y)], style));
+        }
+        chart
+            .configure_series_labels()
+            .position(SeriesLabelPosition::MiddleRight)
+            .background_style(WHITE.mix(0.8))
+            .border_style(BLACK.mix(0.3))
+            .label_font((FONT, 13))
+            .draw()?;
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_chart_names_its_lines_and_axes() {
+        let line = Line { name: "refit".to_string(), points: vec![(1.0, 1.0), (2.0, 400.0), (3.0, 20.0)] };
+        let panel = |is_log| Panel { y: "cost".to_string(), is_log, lines: vec![line.clone()] };
+        let chart = Chart {
+            name: "c".to_string(),
+            title: "Twist".to_string(),
+            panels: vec![panel(true), panel(false)],
+        };
+        let svg = chart.svg().unwrap();
+        for word in ["Twist", "cost", "frame", "refit", "polyline"] {
+            assert!(svg.contains(word), "{word}: {svg}");
+        }
+        let empty = Chart { panels: vec![Panel { lines: Vec::new(), ..panel(true) }], ..chart };
+        assert!(empty.svg().is_ok());
+    }
+}

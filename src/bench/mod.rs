@@ -1,0 +1,175 @@
+//! The built-in benchmarks: named workloads, each with tables, charts and JSON. Medians of runs in turn; a peer that is
+//! not installed is absent, never filled in.
+
+mod chart;
+mod embree;
+mod policy;
+mod reading;
+pub mod sequences;
+mod start;
+mod table;
+mod times;
+mod trees;
+mod updates;
+mod view;
+mod warm;
+
+use chart::Chart;
+pub use table::{Cell, Table};
+pub use times::Spread;
+
+use crate::job::{self, Job, JobError, Options, Request};
+use crate::math::Vec3;
+use crate::output::{OutputError, write_atomic};
+use crate::run::{RunError, machine};
+use std::fs::create_dir_all;
+use std::io;
+use std::path::{Path, PathBuf};
+use tempfile::TempDir;
+use view::View;
+
+/// What is asked for.
+#[derive(Clone, Debug)]
+pub struct BenchOptions {
+    /// Where tables and charts go.
+    pub folder: PathBuf,
+    /// A folder of scenes; without it only made ones are taken.
+    pub scenes: Option<PathBuf>,
+    /// The Embree program (`benches/peers/embree_bench.cpp`).
+    pub embree: Option<PathBuf>,
+    /// Fewer runs, smaller made scenes.
+    pub quick: bool,
+    /// Threads.
+    pub threads: usize,
+}
+
+type Run = fn(&Bench, &mut dyn FnMut(&Event<'_>)) -> Result<Findings, BenchError>;
+
+/// A workload.
+#[derive(Clone, Copy, Debug)]
+pub struct Workload {
+    /// Its name on the command line.
+    pub name: &'static str,
+    /// What it measures.
+    pub about: &'static str,
+    run: Run,
+}
+
+/// All of them.
+pub const WORKLOADS: [Workload; 1] = [Workload {
+    name: "updates",
+    about: "what a frame costs that follows another: reading, trees, refit or rebuild, the store",
+    run: updates::updates,
+}];
+
+/// What is told while it goes on.
+#[derive(Debug)]
+pub enum Event<'a> {
+    /// What is measured now.
+    Stage(&'a str),
+    /// A table is complete.
+    Table(&'a Table),
+}
+
+/// Why a benchmark did not come to its end.
+#[derive(Debug, thiserror::Error)]
+pub enum BenchError {
+    /// Made scenes cannot be written.
+    #[error("made scenes or results cannot be written: {0}; TMPDIR and -o name other places")]
+    Room(#[from] io::Error),
+    /// A scene cannot be rendered.
+    #[error(transparent)]
+    Job(#[from] JobError),
+    /// A run cannot begin.
+    #[error(transparent)]
+    Run(#[from] RunError),
+    /// A frame cannot be read or traced.
+    #[error("{0}")]
+    Frame(String),
+    /// The system gives no threads.
+    #[error("the system gives no threads; fewer may be asked for by --threads")]
+    NoThreads,
+    /// A chart cannot be drawn.
+    #[error("a chart cannot be drawn: {0}")]
+    Chart(String),
+    /// The tables cannot be written.
+    #[error(transparent)]
+    Output(#[from] OutputError),
+}
+
+/// What a workload found.
+#[derive(Debug, Default)]
+struct Findings {
+    tables: Vec<Table>,
+    charts: Vec<Chart>,
+}
+
+impl Findings {
+    fn add(&mut self, table: Table, on_event: &mut dyn FnMut(&Event<'_>)) {
+        on_event(&Event::Table(&table));
+        self.tables.push(table);
+    }
+}
+
+/// What workloads share.
+struct Bench {
+    options: BenchOptions,
+    /// Made scenes and pictures.
+    room: TempDir,
+}
+
+impl Bench {
+    /// How often something is measured that deserves so many times.
+    fn rounds(&self, rounds: usize) -> usize {
+        if self.options.quick { rounds.div_ceil(4) } else { rounds }
+    }
+
+    /// A file of the scenes, where it is there.
+    fn scene(&self, file: &str) -> Option<PathBuf> {
+        let path = self.options.scenes.as_ref()?.join(file);
+        path.is_file().then_some(path)
+    }
+
+    /// The job of an INPUT, in small pictures, to a folder of the room.
+    fn job(&self, input: &Path, view: Option<&View>) -> Result<Job, JobError> {
+        let point = |of: fn(&View) -> [f32; 3]| view.map(|v| Vec3::from(of(v)).as_dvec3());
+        job::resolve(&Request {
+            inputs: vec![input.to_path_buf()],
+            options: Options {
+                size: Some([640, 360]),
+                eye: point(|v| v.eye),
+                look_at: point(|v| v.look_at),
+                fov: view.map(|v| f64::from(v.fov_deg)),
+                ..Options::default()
+            },
+            folder: Some(self.room.path().join("pictures")),
+            ..Request::default()
+        })
+    }
+}
+
+/// Runs workloads and writes what they found: `NAME.json` and charts.
+pub fn bench(
+    workloads: &[Workload],
+    options: BenchOptions,
+    on_event: &mut dyn FnMut(&Event<'_>),
+) -> Result<(), BenchError> {
+    let bench = Bench { options, room: tempfile::tempdir()? };
+    // told before the work, not after it
+    create_dir_all(&bench.options.folder)?;
+    for workload in workloads {
+        let found = (workload.run)(&bench, on_event)?;
+        let folder = &bench.options.folder;
+        let json = serde_json::json!({
+            "rentix": env!("CARGO_PKG_VERSION"), "workload": workload.name, "machine": machine::machine(),
+            "quick": bench.options.quick, "threads": bench.options.threads, "tables": found.tables,
+        });
+        let json = serde_json::to_vec_pretty(&json).unwrap_or_default();
+        write_atomic(&folder.join(format!("{}.json", workload.name)), &json)?;
+        for chart in &found.charts {
+            let svg = chart.svg().map_err(BenchError::Chart)?;
+            write_atomic(&folder.join(format!("{}.svg", chart.name)), svg.as_bytes())?;
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,147 @@
+//! The workload `updates`: reading, trees, warm frames, refit or rebuild, the store, on scenes and on made sequences.
+
+use super::policy::{Input, policy};
+use super::reading::{Consecutive, reading};
+use super::sequences::{HOSTILE, write_wave};
+use super::start::starts;
+use super::trees::{Mesh, trees};
+use super::view::View;
+use super::warm::{WarmPeers, warm_frames};
+use super::{Bench, BenchError, Event, Findings, embree};
+use crate::format::{ReadOptions, TextureCache, load_obj};
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+/// Scenes of which meshes are taken, and where those that are rooms are looked at from.
+const MESHES: [(&str, &str, Option<View>); 4] = [
+    ("bunny", "bunny/stanford-bunny.obj", None),
+    ("dragon", "dragon/dragon_100k.obj", None),
+    (
+        "conference",
+        "conference/conference.obj",
+        Some(View { eye: [1000.0, 400.0, 500.0], look_at: [0.0, 150.0, -200.0], fov_deg: 40.0 }),
+    ),
+    ("sibenik", "sibenik/sibenik.obj", Some(SIBENIK)),
+];
+const SIBENIK: View = View { eye: [-17.0, -13.0, 0.0], look_at: [0.0, -11.0, 0.0], fov_deg: 60.0 };
+
+/// Meshes through which waves run, by their names among [`MESHES`].
+const WAVES: [&str; 3] = ["bunny", "dragon", "conference"];
+/// Side of the sheets of hostile sequences, their frames, and those of waves.
+const SIDE: u32 = 200;
+const FRAMES: u32 = 32;
+const WAVE_FRAMES: u32 = 12;
+
+/// Runs it.
+pub(super) fn updates(bench: &Bench, on_event: &mut dyn FnMut(&Event<'_>)) -> Result<Findings, BenchError> {
+    let mut findings = Findings::default();
+    let hostile = hostile(bench)?;
+    on_event(&Event::Stage("reading meshes, making waves"));
+    let meshes = meshes(bench, &hostile)?;
+    let waves = waves(bench, &hostile)?;
+    on_event(&Event::Stage("reading"));
+    let mut read: Vec<Consecutive> = Vec::new();
+    for (name, folder) in waves.iter().chain(&sequences(bench)) {
+        read.push(Consecutive::of(name, &obj_files(folder)));
+    }
+    findings.add(reading(bench, &read), on_event);
+    on_event(&Event::Stage("trees"));
+    findings.add(trees(bench, &meshes), on_event);
+
+    on_event(&Event::Stage("warm frames"));
+    let rates = &findings.tables[0];
+    let rate =
+        |name: &str| rates.rows.iter().find(|(row, _)| row == name).and_then(|(_, cells)| cells[3].value());
+    let refit_ms = |name: &str| {
+        let mesh = meshes.iter().find(|mesh| name.starts_with(&mesh.name))?;
+        mesh.embree.as_ref()?.refit_one_thread_ms
+    };
+    let with_peers: Vec<_> = waves
+        .iter()
+        .map(|(name, folder)| {
+            (name.clone(), &**folder, WarmPeers { reading: rate(name), embree_refit_ms: refit_ms(name) })
+        })
+        .collect();
+    findings.add(warm_frames(bench, &with_peers)?, on_event);
+
+    if let Some(sibenik) = bench.scene("sibenik/sibenik.obj") {
+        on_event(&Event::Stage("start"));
+        findings.add(starts(bench, &[("sibenik", &sibenik, SIBENIK)])?, on_event);
+    }
+    on_event(&Event::Stage("refit or rebuild"));
+    let input = |is_charted| move |(name, folder): (String, PathBuf)| Input { name, folder, is_charted };
+    let mut inputs: Vec<Input> = hostile.into_iter().map(input(true)).collect();
+    inputs.extend(waves.into_iter().chain(sequences(bench)).map(input(false)));
+    let (table, charts) = policy(bench, &inputs)?;
+    findings.add(table, on_event);
+    findings.charts.extend(charts);
+    Ok(findings)
+}
+
+/// The hostile sequences, written.
+fn hostile(bench: &Bench) -> Result<Vec<(String, PathBuf)>, BenchError> {
+    let (side, frames) = if bench.options.quick { (SIDE / 4, FRAMES / 2) } else { (SIDE, FRAMES) };
+    let write = |hostile: &super::sequences::Hostile| {
+        let folder = bench.room.path().join(hostile.name);
+        hostile.write(side, frames, &folder)?;
+        Ok((hostile.name.to_string(), folder))
+    };
+    HOSTILE.iter().map(write).collect()
+}
+
+/// The sheet that hostile sequences begin with.
+fn sheet(hostile: &[(String, PathBuf)]) -> Option<PathBuf> {
+    let (_, folder) = hostile.iter().find(|(name, _)| name == "explosion")?;
+    obj_files(folder).into_iter().next()
+}
+
+/// The meshes of the scenes, and a sheet.
+fn meshes(bench: &Bench, hostile: &[(String, PathBuf)]) -> Result<Vec<Mesh>, BenchError> {
+    let scenes = MESHES.iter().filter_map(|(name, file, view)| Some((*name, bench.scene(file)?, *view)));
+    let all = scenes.chain(sheet(hostile).map(|file| ("sheet", file, None)));
+    let load = |(name, file, view): (&str, PathBuf, Option<View>)| {
+        let loaded = load_obj(&file, &ReadOptions::default(), &TextureCache::default())
+            .map_err(|e| BenchError::Frame(e.to_string()))?;
+        let camera = view.map(|v| v.options()).unwrap_or_default();
+        let program = bench.options.embree.as_deref();
+        let embree = program.and_then(|p| embree::measure(p, &file, &camera, rayon::current_num_threads()));
+        Ok(Mesh { name: name.to_string(), geometry: Arc::clone(&loaded.geometry), view, embree })
+    };
+    all.map(load).collect()
+}
+
+/// Waves through meshes of the scenes, or else through a sheet.
+fn waves(bench: &Bench, hostile: &[(String, PathBuf)]) -> Result<Vec<(String, PathBuf)>, BenchError> {
+    let of_scenes = MESHES.iter().filter(|(name, ..)| WAVES.contains(name));
+    let mut files: Vec<(&str, PathBuf)> =
+        of_scenes.filter_map(|(name, file, _)| Some((*name, bench.scene(file)?))).collect();
+    if files.is_empty() {
+        files.extend(sheet(hostile).map(|file| ("sheet", file)));
+    }
+    let write = |(name, file): (&str, PathBuf)| {
+        let name = format!("{name} wave");
+        let folder = bench.room.path().join(&name);
+        write_wave(&fs::read_to_string(file)?, WAVE_FRAMES, &folder)?;
+        Ok((name, folder))
+    };
+    files.into_iter().map(write).collect()
+}
+
+/// Folders of scenes that hold sequences: their names begin with `seq-`.
+fn sequences(bench: &Bench) -> Vec<(String, PathBuf)> {
+    let entries =
+        bench.options.scenes.iter().filter_map(|folder| fs::read_dir(folder).ok()).flatten().flatten();
+    let named = entries.map(|e| (e.file_name().to_string_lossy().into_owned(), e.path()));
+    let mut all: Vec<_> = named.filter(|(name, path)| name.starts_with("seq-") && path.is_dir()).collect();
+    all.sort();
+    all
+}
+
+/// The OBJ files of a folder by name.
+fn obj_files(folder: &Path) -> Vec<PathBuf> {
+    let entries = fs::read_dir(folder).into_iter().flatten().flatten().map(|e| e.path());
+    let mut files: Vec<PathBuf> = entries.filter(|p| p.extension().is_some_and(|e| e == "obj")).collect();
+    files.sort();
+    files
+}

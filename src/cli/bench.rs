@@ -1,0 +1,57 @@
+//! `rentix bench`.
+
+use super::Global;
+use crate::bench::{self, BenchOptions, Event, WORKLOADS, Workload};
+use crate::run::machine;
+use anyhow::Result;
+use clap::Args;
+use std::num::NonZeroUsize;
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+/// What `bench` takes.
+#[derive(Args, Debug)]
+#[allow(clippy::doc_markdown, reason = "the text is help on a terminal")]
+pub(super) struct BenchArgs {
+    /// What to measure [default: everything]
+    #[arg(value_name = "NAME", value_parser = WORKLOADS.map(|w| w.name))]
+    names: Vec<String>,
+    /// Where tables and charts go
+    #[arg(short, long, value_name = "DIR", default_value = "bench")]
+    output: PathBuf,
+    /// Fewer runs, smaller made scenes
+    #[arg(long)]
+    quick: bool,
+    /// A folder of scenes; without it made ones are taken [default: RENTIX_SCENES]
+    #[arg(long, value_name = "DIR")]
+    scenes: Option<PathBuf>,
+    /// The program made of benches/peers/embree_bench.cpp [default: RENTIX_EMBREE]
+    #[arg(long, value_name = "PROGRAM")]
+    embree: Option<PathBuf>,
+    /// Threads [default: all cores]
+    #[arg(long, value_name = "N")]
+    threads: Option<NonZeroUsize>,
+}
+
+/// Runs the workloads and prints their tables.
+pub(super) fn bench(args: &BenchArgs, global: &Global) -> Result<ExitCode> {
+    let set = |name: &str| std::env::var_os(name).filter(|value| !value.is_empty()).map(PathBuf::from);
+    let options = BenchOptions {
+        folder: args.output.clone(),
+        scenes: args.scenes.clone().or_else(|| set("RENTIX_SCENES")),
+        embree: args.embree.clone().or_else(|| set("RENTIX_EMBREE")),
+        quick: args.quick,
+        threads: args.threads.map_or_else(|| machine::machine().cores, usize::from),
+    };
+    let is_asked = |w: &Workload| args.names.is_empty() || args.names.iter().any(|name| name == w.name);
+    let workloads: Vec<Workload> = WORKLOADS.into_iter().filter(is_asked).collect();
+    bench::bench(&workloads, options, &mut |event| match event {
+        Event::Stage(what) if !(global.quiet || global.json) => eprintln!("{what} ..."),
+        Event::Stage(_) => {}
+        Event::Table(table) if global.json => {
+            println!("{}", serde_json::to_value(table).unwrap_or_default());
+        }
+        Event::Table(table) => println!("{table}"),
+    })?;
+    Ok(ExitCode::SUCCESS)
+}
