@@ -2,7 +2,7 @@
 //! rebuilt, in any order, by `rentix verify` and by pictures of processes of their own.
 
 mod common;
-use common::{pictures, render, report, run};
+use common::{assert_same, pictures, render, report, run};
 use rentix::bench::sequences::{HOSTILE, Hostile};
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
@@ -169,4 +169,50 @@ fn what_stands_still_costs_nothing() {
             assert_eq!((&f["update"]["action"], &f["change"]["same"]), (&"refit".into(), &1.into()));
         }
     }
+}
+
+/// Shapes that take turns for as long as the job lasts: with space each is built once; with too little, what was used
+/// least recently makes way, and the pictures are the same.
+#[test]
+fn what_comes_again_stays_until_space_is_short() {
+    let t = tempfile::tempdir().unwrap();
+    let t = t.path();
+    let shapes = t.join("shapes");
+    std::fs::create_dir(&shapes).unwrap();
+    for frame in 0..3 {
+        // another number of faces in each
+        let faces = format!("f 1 2 {}\n", SIDE + 2).repeat(frame);
+        let text = moved(0, |_, [x, y, z]| [x, y + 0.1 * frame as f64, z]) + &faces;
+        std::fs::write(shapes.join(format!("s_{frame}.obj")), text).unwrap();
+    }
+    let job = t.join("job.yaml");
+    std::fs::write(
+        &job,
+        "layers:\n  - sequence: shapes\n    frames: {outside: loop}\nframes: 0-11\noutput: {size: [96, 54]}\n",
+    )
+    .unwrap();
+    let with = |out: &str, budget: &str| {
+        let r = t.join(format!("{out}.json"));
+        let args = ["--report", r.to_str().unwrap(), "--device-memory", budget];
+        render(t, &job, out, &args, 0);
+        (report(&r), pictures(&t.join(out)))
+    };
+    let evictions =
+        |report: &serde_json::Value| report["devices"][0]["resident"]["evictions"].as_u64().unwrap();
+    let builds = |report: &serde_json::Value| {
+        let frames = report["frames"].as_array().unwrap();
+        frames
+            .iter()
+            .filter(|f| ["load", "rebuild"].contains(&f["update"]["action"].as_str().unwrap()))
+            .count()
+    };
+    let (ample, right) = with("ample", "1G");
+    assert_eq!((evictions(&ample), builds(&ample), right.len()), (0, 3, 12));
+    let held = ample["devices"][0]["resident"]["peak"].as_u64().unwrap();
+    let (tight, pictures) = with("tight", &(held - 1).to_string());
+    assert!(evictions(&tight) > 0 && builds(&tight) > 3, "{tight}");
+    assert!(tight["devices"][0]["resident"]["peak"].as_u64().unwrap() < held);
+    assert_same(&right, &pictures, "with little memory");
+    let told = run(t, ["verify", job.to_str().unwrap(), "--device-memory", &(held - 1).to_string()]);
+    assert_eq!(told.status, 0, "{}", told.stderr);
 }

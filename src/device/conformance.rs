@@ -5,7 +5,7 @@
 use super::{Device, DeviceError, Stop};
 use crate::film::Film;
 use crate::math::{DAffine3, DVec3, Vec3};
-use crate::plan::{Action, Step, Wishes, plan_frame};
+use crate::plan::{Action, Residency, Step, Wishes, plan_frame};
 use crate::scene::{
     Aov, AovSet, Background, Camera, Faces, Falloff, Filter, Frame, Geometry, Light, Material, MaterialRuns,
     Mesh, Object, Part, Positions, Shot, Triangles,
@@ -27,6 +27,7 @@ pub fn check(make: Make) {
     what_is_resident_is_not_uploaded(make);
     residency_adds_up(make);
     a_cold_plan_forgets_everything(make);
+    what_comes_again_is_kept_while_there_is_space(make);
     what_does_not_fit_is_refused(make);
     a_frame_without_objects_is_background(make);
     a_stopped_trace_says_so(make);
@@ -78,7 +79,11 @@ fn residency_adds_up(make: Make) {
         parts.dedup();
         let trees: Vec<_> = frame.objects.iter().map(|o| crate::plan::tree_name(&o.geometry)).collect();
         for (name, bytes) in &parts {
-            assert_eq!(after.held.get(name), Some(bytes), "a part is not held with its bytes");
+            assert_eq!(
+                after.held.get(name).map(|h| h.bytes),
+                Some(*bytes),
+                "a part is not held with its bytes"
+            );
         }
         let strangers =
             after.held.keys().filter(|n| !trees.contains(n) && !parts.iter().any(|(p, _)| p == *n));
@@ -114,6 +119,40 @@ fn a_cold_plan_forgets_everything(make: Make) {
     assert_eq!(cost.uploaded_bytes, bytes, "a cold plan uploads all");
     let cold = device.trace(frame, &shot(), &Stop::default()).expect("it is resident");
     assert!(cold.film == warm, "the cold picture differs");
+}
+
+/// Frames whose faces differ take turns: with space each is loaded once; without, something is evicted each time, the
+/// budget holds and the pictures stay.
+fn what_comes_again_is_kept_while_there_is_space(make: Make) {
+    let of = |n| Frame {
+        objects: vec![Object { geometry: sheet(n, 0.0, &Material::default()), transform: None }],
+    };
+    let (a, b) = (of(12), of(13));
+    let turns = [&a, &b, &a, &b, &a];
+    let cold = turns.map(|frame| picture(&mut *make(AMPLE_BYTES), frame));
+    let run = |device: &mut dyn Device| {
+        let mut uploaded = Vec::new();
+        for (frame, cold) in turns.iter().zip(&cold) {
+            let budget_bytes = device.info().budget_bytes;
+            let wishes = Wishes { used_again: vec![0], budget_bytes, ..Wishes::default() };
+            let plan = plan_frame(frame, device.residency(), &wishes);
+            uploaded.push(device.apply(&plan, frame).expect("each frame fits").uploaded_bytes);
+            assert!(device.residency().bytes() <= budget_bytes, "more is held than is allowed");
+            let traced = device.trace(frame, &shot(), &Stop::default()).expect("it is resident");
+            assert!(traced.film == *cold, "the picture of a frame that came again differs");
+        }
+        uploaded
+    };
+    let mut ample = make(AMPLE_BYTES);
+    let uploaded = run(&mut *ample);
+    assert!(uploaded[..2].iter().all(|b| *b > 0) && uploaded[2..] == [0; 3], "{uploaded:?}");
+    assert_eq!(ample.residency().evictions, 0);
+    // what the larger one is taken to need alone
+    let empty = Residency::default();
+    let needed_bytes = plan_frame(&b, &empty, &Wishes::default()).needed_bytes(&empty);
+    let mut tight = make(needed_bytes);
+    assert!(run(&mut *tight)[2..].iter().all(|b| *b > 0), "what was evicted was not uploaded again");
+    assert!(tight.residency().evictions > 0, "nothing was evicted");
 }
 
 /// Refused with the figures, and nothing changes: the device goes on with what fits.

@@ -3,12 +3,9 @@
 
 use super::{Device, DeviceError, DeviceInfo, DeviceKind, RayCounts, Stop, Traced, UpdateCost};
 use crate::film::Film;
-use crate::plan::{Residency, Step, TreeState, UpdatePlan, tree_name};
+use crate::plan::{Residency, Step, TREE_BYTES_PER_TRIANGLE, TreeState, UpdatePlan, tree_name};
 use crate::scene::{Background, Frame, Object, PartHash, Shot};
 use std::collections::BTreeMap;
-
-/// Bytes that a tree of the fake device takes for each triangle.
-const TREE_BYTES_PER_TRIANGLE: u64 = 64;
 
 /// How a frame fails.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -90,27 +87,32 @@ impl Device for FakeDevice {
 
     fn apply(&mut self, plan: &UpdatePlan, frame: &Frame) -> Result<UpdateCost, DeviceError> {
         self.check_lost()?;
-        let needed_bytes = plan.needed_bytes(&self.residency, TREE_BYTES_PER_TRIANGLE);
+        let needed_bytes = plan.needed_bytes(&self.residency);
         let is_faulty = self.faults.get(&frame.hash()) == Some(&Fault::OutOfMemory);
         if is_faulty || needed_bytes > self.info.budget_bytes {
             return Err(self.out_of_memory(needed_bytes));
         }
         let mut uploaded_bytes = 0;
+        self.residency.begin();
         for step in &plan.steps {
             match *step {
                 Step::Free { name } => self.residency.free(name),
-                Step::Keep { .. } => self.residency.keep(),
+                Step::Evict { name } => self.residency.evict(name),
+                Step::Keep { name } => self.residency.keep(name),
                 Step::Upload { part, bytes } => {
                     uploaded_bytes += bytes;
                     self.residency.hold(part, bytes);
                 }
-                Step::Refit { from, tree, .. } => self.residency.refit(from, tree, 1.0),
+                Step::Refit { from, tree, object, .. } => {
+                    self.residency.refit(from, tree, &frame.objects[object].geometry, 1.0);
+                }
                 Step::Build { tree, triangles, object } => {
                     let state = TreeState::built(&frame.objects[object].geometry, 1.0);
                     self.residency.hold_tree(tree, triangles * TREE_BYTES_PER_TRIANGLE, state);
                 }
             }
         }
+        self.residency.end(&plan.again);
         Ok(UpdateCost { uploaded_bytes, ..UpdateCost::default() })
     }
 

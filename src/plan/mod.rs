@@ -1,63 +1,41 @@
 //! What a device must do before it can trace a frame, as a value that can be printed, tested and replayed. Pure.
 
 mod policy;
+mod residency;
 
 pub use policy::{Costs, Update};
+pub use residency::{Held, Residency, TREE_BYTES_PER_TRIANGLE, TreeState};
 
 use crate::scene::{Frame, Geometry, PartHash, PartHasher};
 use policy::{Choice, candidate, choose};
 use std::collections::{BTreeMap, BTreeSet};
 
-/// What is known of a tree that a device holds.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct TreeState {
-    /// The faces that it stands over.
-    pub faces: PartHash,
-    /// Triangles.
-    pub triangles: u64,
-    /// Surface-area cost when it was built.
-    pub built_cost: f64,
-    /// Surface-area cost now.
-    pub cost: f64,
-    /// Sum over the frames since the build of [`Self::ratio`] − 1.
-    pub excess: f64,
-}
-
-impl TreeState {
-    /// Of a tree that was just built.
-    pub fn built(geometry: &Geometry, cost: f64) -> Self {
-        let triangles = geometry.triangles.0.len() as u64;
-        Self { faces: geometry.faces.hash(), triangles, built_cost: cost, cost, excess: 0.0 }
-    }
-
-    /// The same after a refit that has this cost.
-    #[must_use]
-    pub fn refitted(self, cost: f64) -> Self {
-        let now = Self { cost, ..self };
-        Self { excess: (self.excess + now.ratio() - 1.0).max(0.0), ..now }
-    }
-
-    /// The surface-area cost over that of the last build; 1 where there is none.
-    pub fn ratio(&self) -> f64 {
-        if self.cost <= 0.0 {
-            1.0
-        } else if self.built_cost <= 0.0 {
-            f64::INFINITY
-        } else {
-            self.cost / self.built_cost
-        }
-    }
-}
-
 /// How a frame is to be made resident.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Wishes {
     /// Forget everything first.
     pub cold: bool,
+    /// Bytes that the device may hold.
+    pub budget_bytes: u64,
+    /// Objects that frames to come show again, by their places in this frame.
+    pub used_again: Vec<usize>,
     /// What is to be done with trees over meshes that changed.
     pub update: Update,
     /// What things cost.
     pub costs: Costs,
+}
+
+impl Default for Wishes {
+    /// Without a bound, and nothing comes again.
+    fn default() -> Self {
+        Self {
+            cold: false,
+            budget_bytes: u64::MAX,
+            used_again: Vec::new(),
+            update: Update::default(),
+            costs: Costs::default(),
+        }
+    }
 }
 
 impl Wishes {
@@ -67,68 +45,16 @@ impl Wishes {
     }
 }
 
-/// What a device holds: parts and trees with their bytes, and the counts of the report.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Residency {
-    /// Bytes by name; trees stand under [`tree_name`].
-    pub held: BTreeMap<PartHash, u64>,
-    /// What is known of the trees among them.
-    pub trees: BTreeMap<PartHash, TreeState>,
-    /// The most bytes ever held.
-    pub peak_bytes: u64,
-    /// Parts and trees that were there when a frame needed them.
-    pub hits: u64,
-    /// Those that were not.
-    pub misses: u64,
-    /// Those given up for want of space.
-    pub evictions: u64,
-}
-
-impl Residency {
-    /// Bytes held now.
-    pub fn bytes(&self) -> u64 {
-        self.held.values().sum()
-    }
-
-    /// A part or tree was there when a frame needed it.
-    pub fn keep(&mut self) {
-        self.hits += 1;
-    }
-
-    /// A part or tree was not there and is now held.
-    pub fn hold(&mut self, name: PartHash, bytes: u64) {
-        self.misses += 1;
-        self.held.insert(name, bytes);
-        self.peak_bytes = self.peak_bytes.max(self.bytes());
-    }
-
-    /// A tree was built.
-    pub fn hold_tree(&mut self, name: PartHash, bytes: u64, state: TreeState) {
-        self.hold(name, bytes);
-        self.trees.insert(name, state);
-    }
-
-    /// A tree was fitted to other positions and has another name now; it counts as there.
-    pub fn refit(&mut self, from: PartHash, to: PartHash, cost: f64) {
-        self.hits += 1;
-        if let (Some(bytes), Some(state)) = (self.held.remove(&from), self.trees.remove(&from)) {
-            self.held.insert(to, bytes);
-            self.trees.insert(to, state.refitted(cost));
-        }
-    }
-
-    /// Gives up a part or tree.
-    pub fn free(&mut self, name: PartHash) {
-        self.held.remove(&name);
-        self.trees.remove(&name);
-    }
-}
-
 /// One step of a plan.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Step {
-    /// Give up a part or tree.
+    /// Give up a part or tree that nothing needs any more.
     Free {
+        /// Its name.
+        name: PartHash,
+    },
+    /// Give up a part or tree for want of space.
+    Evict {
         /// Its name.
         name: PartHash,
     },
@@ -208,6 +134,8 @@ pub struct UpdatePlan {
     pub predicted_ms: f64,
     /// Whether everything was to be forgotten first.
     pub is_cold: bool,
+    /// Parts and trees of the frame that frames to come use again.
+    pub again: BTreeSet<PartHash>,
 }
 
 impl UpdatePlan {
@@ -216,17 +144,9 @@ impl UpdatePlan {
         self.steps.iter().any(|s| matches!(s, Step::Keep { .. } | Step::Refit { .. }))
     }
 
-    /// Bytes that will be held after it, trees that are to be built estimated at so many bytes a triangle.
-    pub fn needed_bytes(&self, residency: &Residency, tree_bytes_per_triangle: u64) -> u64 {
-        let of_step = |step: &Step| match step {
-            Step::Free { .. } => 0,
-            Step::Keep { name } | Step::Refit { from: name, .. } => {
-                residency.held.get(name).copied().unwrap_or(0)
-            }
-            Step::Upload { bytes, .. } => *bytes,
-            Step::Build { triangles, .. } => triangles * tree_bytes_per_triangle,
-        };
-        self.steps.iter().map(of_step).sum()
+    /// Bytes that the frame itself needs, trees that are to be built estimated.
+    pub fn needed_bytes(&self, residency: &Residency) -> u64 {
+        needed_bytes(&self.steps, residency)
     }
 }
 
@@ -239,9 +159,10 @@ pub fn tree_name(geometry: &Geometry) -> PartHash {
 }
 
 /// Plans a frame: what is resident is kept, trees over meshes that only moved are refitted where that is expected to take
-/// less time, what is missing is uploaded or built, what the frame does not use is freed.
+/// less time, what is missing is uploaded or built. What the frame does not use is freed, but for what frames to come use
+/// again and nothing overwrites: that is kept while there is space.
 pub fn plan_frame(frame: &Frame, residency: &Residency, wishes: &Wishes) -> UpdatePlan {
-    let Wishes { cold, update, costs } = wishes;
+    let Wishes { cold, update, costs, .. } = wishes;
     let mut needed: BTreeMap<PartHash, u64> = BTreeMap::new();
     let mut trees: BTreeMap<PartHash, usize> = BTreeMap::new();
     for (i, object) in frame.objects.iter().enumerate() {
@@ -251,7 +172,8 @@ pub fn plan_frame(frame: &Frame, residency: &Residency, wishes: &Wishes) -> Upda
     let used: BTreeSet<PartHash> = needed.keys().chain(trees.keys()).copied().collect();
     let is_held = |name: &PartHash| !cold && residency.held.contains_key(name);
 
-    let mut taken = BTreeSet::new();
+    // trees that are fitted to other positions, and those in whose place another is built
+    let (mut taken, mut overwritten) = (BTreeSet::new(), BTreeSet::new());
     let mut tree_steps = Vec::new();
     let mut why = Vec::new();
     let mut predicted_ms = 0.0;
@@ -262,14 +184,21 @@ pub fn plan_frame(frame: &Frame, residency: &Residency, wishes: &Wishes) -> Upda
             tree_steps.push(Step::Keep { name: tree });
             continue;
         }
-        let is_free = |name: &PartHash| !cold && !used.contains(name) && !taken.contains(name);
+        let is_free = |name: &PartHash| {
+            !cold && !used.contains(name) && !taken.contains(name) && !overwritten.contains(name)
+        };
         let step = match candidate(residency, geometry.faces.hash(), triangles, is_free) {
             None => Step::Build { tree, object, triangles },
             Some(from) => {
-                let (choice, terms) = choose(&residency.trees[&from], triangles, *update, costs);
+                let state = &residency.trees[&from];
+                let (choice, terms) = choose(state, triangles, *update, costs);
                 why.push(terms);
+                overwritten.extend(&state.parts);
                 match choice {
-                    Choice::Rebuild => Step::Build { tree, object, triangles },
+                    Choice::Rebuild => {
+                        overwritten.insert(from);
+                        Step::Build { tree, object, triangles }
+                    }
                     Choice::Refit { keep_up_to } => {
                         taken.insert(from);
                         Step::Refit { from, tree, object, triangles, keep_up_to }
@@ -282,12 +211,24 @@ pub fn plan_frame(frame: &Frame, residency: &Residency, wishes: &Wishes) -> Upda
         tree_steps.push(step);
     }
 
-    let unused = residency.held.keys().filter(|n| *cold || !used.contains(n) && !taken.contains(n));
-    let mut steps: Vec<Step> = unused.map(|&name| Step::Free { name }).collect();
+    let unused = |name: &PartHash| *cold || !used.contains(name) && !taken.contains(name);
+    let is_kept = |name: &PartHash, held: &Held| !cold && held.again && !overwritten.contains(name);
+    let (kept, freed): (Vec<_>, Vec<_>) =
+        residency.held.iter().filter(|(name, _)| unused(name)).partition(|(name, held)| is_kept(name, held));
+    let mut steps = Vec::new();
     for (&part, &bytes) in &needed {
         steps.push(if is_held(&part) { Step::Keep { name: part } } else { Step::Upload { part, bytes } });
     }
     steps.extend(tree_steps);
+    let frees = freed.into_iter().map(|(&name, _)| Step::Free { name });
+    let evicted = to_evict(kept, needed_bytes(&steps, residency), wishes.budget_bytes);
+    steps.splice(0..0, frees.chain(evicted.into_iter().map(|name| Step::Evict { name })));
+
+    let again = wishes.used_again.iter().filter_map(|&i| frame.objects.get(i)).flat_map(|object| {
+        let parts = object.geometry.parts().into_iter().map(|(name, _)| name);
+        parts.chain([tree_name(&object.geometry)])
+    });
+    let again = again.collect();
 
     let count = |of: fn(&Step) -> bool| steps.iter().filter(|s| of(s)).count();
     let kept = count(|s| matches!(s, Step::Keep { .. } | Step::Refit { .. }));
@@ -312,5 +253,36 @@ pub fn plan_frame(frame: &Frame, residency: &Residency, wishes: &Wishes) -> Upda
         part_bytes: needed.values().sum(),
         predicted_ms,
         is_cold: *cold,
+        again,
     }
 }
+
+fn needed_bytes(steps: &[Step], residency: &Residency) -> u64 {
+    let held_bytes = |name: &PartHash| residency.held.get(name).map_or(0, |held| held.bytes);
+    let of_step = |step: &Step| match step {
+        Step::Free { .. } | Step::Evict { .. } => 0,
+        Step::Keep { name } | Step::Refit { from: name, .. } => held_bytes(name),
+        Step::Upload { bytes, .. } => *bytes,
+        Step::Build { triangles, .. } => triangles * TREE_BYTES_PER_TRIANGLE,
+    };
+    steps.iter().map(of_step).sum()
+}
+
+/// Which of what is kept beside a frame must go so that all is within a budget: the least recently used first.
+fn to_evict(kept: Vec<(&PartHash, &Held)>, needed_bytes: u64, budget_bytes: u64) -> Vec<PartHash> {
+    let mut bytes = needed_bytes + kept.iter().map(|(_, held)| held.bytes).sum::<u64>();
+    let mut by_age = kept;
+    by_age.sort_by_key(|(name, held)| (held.last_used, **name));
+    let mut evicted = Vec::new();
+    for (name, held) in by_age {
+        if bytes <= budget_bytes {
+            break;
+        }
+        bytes -= held.bytes;
+        evicted.push(*name);
+    }
+    evicted
+}
+
+#[cfg(test)]
+mod tests;

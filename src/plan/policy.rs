@@ -5,6 +5,7 @@
 
 use super::{Residency, TreeState};
 use crate::scene::PartHash;
+use std::cmp::Reverse;
 
 /// What is to be done with trees over meshes that changed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -81,7 +82,7 @@ pub(super) fn choose(state: &TreeState, triangles: u64, update: Update, costs: &
 }
 
 /// The tree that may be refitted to a geometry: one over the same faces that the frame does not need as it is; of
-/// several the first.
+/// several the one used last, and of those the first.
 pub(super) fn candidate(
     residency: &Residency,
     faces: PartHash,
@@ -89,7 +90,9 @@ pub(super) fn candidate(
     is_free: impl Fn(&PartHash) -> bool,
 ) -> Option<PartHash> {
     let fits = |s: &TreeState| s.faces == faces && s.triangles == triangles;
-    residency.trees.iter().find(|(name, s)| fits(s) && is_free(name)).map(|(name, _)| *name)
+    let last_used = |name: &PartHash| residency.held.get(name).map_or(0, |held| held.last_used);
+    let names = residency.trees.iter().filter(|(name, s)| fits(s) && is_free(name)).map(|(name, _)| *name);
+    names.min_by_key(|name| (Reverse(last_used(name)), *name))
 }
 
 #[cfg(test)]
@@ -103,7 +106,7 @@ mod tests {
 
     fn state(ratio: f64, excess: f64) -> TreeState {
         let faces = PartHasher::new("faces").finish();
-        TreeState { faces, triangles: 1000, built_cost: 10.0, cost: 10.0 * ratio, excess }
+        TreeState { faces, parts: Vec::new(), triangles: 1000, built_cost: 10.0, cost: 10.0 * ratio, excess }
     }
 
     fn refits(state: &TreeState, costs: &Costs) -> bool {

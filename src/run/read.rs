@@ -13,6 +13,7 @@ use crate::job::{Job, Picture, Settings};
 use crate::output::{Bits, Encoding, Format, Records};
 use crate::scene::{Frame, Object, PartHash, PartHasher, Shot};
 use crate::warning::Warnings;
+use std::collections::HashMap;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -26,6 +27,8 @@ const PICTURE_VERSION: u64 = 3;
 pub(super) struct ReadFrame {
     pub(super) report: Box<FrameReport>,
     pub(super) frame: Arc<Frame>,
+    /// Objects that later pictures show, too, by their places in the frame.
+    pub(super) used_again: Vec<usize>,
     pub(super) shot: Shot,
     pub(super) encoding: Encoding,
     pub(super) fingerprint: PartHash,
@@ -48,6 +51,8 @@ pub(super) struct Reader<'a> {
     options: &'a RunOptions,
     records: &'a Records,
     prepared: Prepared,
+    /// The last picture that shows a file.
+    last_shown: HashMap<&'a Path, usize>,
 }
 
 /// Reads pictures in turn until there are no more, never more ahead of the device than there are slots.
@@ -88,7 +93,23 @@ impl<'a> Reader<'a> {
         records: &'a Records,
         prepared: Prepared,
     ) -> Self {
-        Self { job, options, records, prepared }
+        let mut last_shown = HashMap::new();
+        for (index, picture) in job.pictures.iter().enumerate() {
+            last_shown.extend(files(job, picture).map(|(_, path)| (path, index)));
+        }
+        Self { job, options, records, prepared, last_shown }
+    }
+
+    /// Which objects of a picture stand in files that later pictures show, too.
+    fn used_again(&self, index: usize, sources: &[usize]) -> Vec<usize> {
+        let comes_again =
+            |&(_, path): &(usize, &Path)| self.last_shown.get(path).is_some_and(|&last| last > index);
+        let again: Vec<usize> = files(self.job, &self.job.pictures[index])
+            .filter(comes_again)
+            .map(|(source, _)| source)
+            .collect();
+        let is_again = |(_, source): &(usize, &usize)| again.contains(source);
+        sources.iter().enumerate().filter(is_again).map(|(object, _)| object).collect()
     }
 
     /// Reads one picture's frame; or its report, where it ends here: failed or finished already.
@@ -104,12 +125,12 @@ impl<'a> Reader<'a> {
         let sources = &self.prepared.sources;
         let loaded =
             load_frame(self.job, picture, sources, self.options.lenient, self.options.strict, warnings);
-        let (frame, views) = match loaded {
+        let (frame, views, sources) = match loaded {
             Ok(loaded) => {
                 report.bytes.read = loaded.bytes_read;
                 report.ms.read = Some(loaded.read_ms);
                 report.ms.parse = Some(loaded.parse_ms);
-                (loaded.frame, loaded.views)
+                (loaded.frame, loaded.views, loaded.sources)
             }
             Err(error) => {
                 report.device_failed = matches!(error, LoadError::TooLarge(_));
@@ -136,6 +157,7 @@ impl<'a> Reader<'a> {
         Ok(ReadFrame {
             report,
             frame: Arc::new(frame),
+            used_again: self.used_again(index, &sources),
             shot,
             encoding,
             fingerprint,
@@ -191,6 +213,8 @@ impl<'a> Reader<'a> {
 /// A frame and what reading it cost; what was kept from an earlier frame costs nothing.
 struct LoadedFrame {
     frame: Frame,
+    /// For each object the place of its source in the picture.
+    sources: Vec<usize>,
     views: Views,
     bytes_read: u64,
     read_ms: f64,
@@ -224,6 +248,13 @@ impl From<FormatError> for LoadError {
     }
 }
 
+/// The files of a picture, each with the place of its source.
+fn files<'a>(job: &'a Job, picture: &'a Picture) -> impl Iterator<Item = (usize, &'a Path)> {
+    let layers = &job.sequences[picture.sequence].layers;
+    let shown = picture.sources.iter().enumerate();
+    shown.filter_map(|(place, s)| Some((place, &*layers[s.layer].files[s.file?].path)))
+}
+
 fn load_frame(
     job: &Job,
     picture: &Picture,
@@ -235,12 +266,13 @@ fn load_frame(
     let sequence = &job.sequences[picture.sequence];
     let mut all = LoadedFrame {
         frame: Frame::default(),
+        sources: Vec::new(),
         views: Views::default(),
         bytes_read: 0,
         read_ms: 0.0,
         parse_ms: 0.0,
     };
-    for source in &picture.sources {
+    for (place, source) in picture.sources.iter().enumerate() {
         let Some(file) = source.file else { continue };
         let layer = &sequence.layers[source.layer];
         let still = layer.files.len() == 1 && job.pictures.len() > 1;
@@ -258,6 +290,7 @@ fn load_frame(
             all.parse_ms += shown.parse_ms;
             all.views.cameras.extend(shown.views.cameras);
             all.views.lights.extend(shown.views.lights);
+            all.sources.extend(shown.objects.iter().map(|_| place));
             all.frame.objects.extend(shown.objects);
             continue;
         }
@@ -272,6 +305,7 @@ fn load_frame(
         if strict && let Some(missing) = loaded.missing.first() {
             return Err(LoadError::Bad(format!("{missing}; the frame is not rendered (--strict)")));
         }
+        all.sources.push(place);
         all.frame
             .objects
             .push(Object { geometry: Arc::clone(&loaded.geometry), transform: source.transform });

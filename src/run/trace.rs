@@ -151,7 +151,13 @@ impl DeviceStage<'_> {
         let before = self.before.as_ref().filter(|_| !cold).map(|before| &*before.frame);
         report.change = changes(before, &read.frame);
         report.ms.diff = Some(clock.ms());
-        let wishes = Wishes { cold, update: self.update, costs: self.learned.costs(self.frames_left) };
+        let wishes = Wishes {
+            cold,
+            budget_bytes: self.device.info().budget_bytes,
+            used_again: if self.cold { Vec::new() } else { std::mem::take(&mut read.used_again) },
+            update: self.update,
+            costs: self.learned.costs(self.frames_left),
+        };
         let plan = plan_frame(&read.frame, self.device.residency(), &wishes);
         let cost = self.device.apply(&plan, &read.frame)?;
         report.updated(&plan, &cost);

@@ -2,7 +2,7 @@
 //! triangles derived from them, and the meshes that are runs of those faces.
 
 use super::material::Material;
-use super::part::{Content, Part, PartHash, PartHasher};
+use super::part::{Content, Part, PartHash, PartHasher, SharedPart};
 use super::texture::Texture;
 use std::collections::HashSet;
 
@@ -131,25 +131,34 @@ impl Geometry {
 
     /// The names of all its parts with their bytes, each once, in a fixed order.
     pub fn parts(&self) -> Vec<(PartHash, u64)> {
+        self.listed().into_iter().map(|(name, bytes, _)| (name, bytes)).collect()
+    }
+
+    /// All its parts by name.
+    pub fn shared_parts(&self) -> impl Iterator<Item = (PartHash, SharedPart)> {
+        self.listed().into_iter().map(|(name, _, part)| (name, part))
+    }
+
+    fn listed(&self) -> Vec<(PartHash, u64, SharedPart)> {
+        fn entry<T: Content + Send + Sync + 'static>(part: &Part<T>) -> (PartHash, u64, SharedPart) {
+            (part.hash(), part.bytes(), part.shared())
+        }
         let mut parts = vec![
-            (self.positions.hash(), self.positions.bytes()),
-            (self.faces.hash(), self.faces.bytes()),
-            (self.triangles.hash(), self.triangles.bytes()),
-            (self.material_runs.hash(), self.material_runs.bytes()),
+            entry(&self.positions),
+            entry(&self.faces),
+            entry(&self.triangles),
+            entry(&self.material_runs),
         ];
         if let Some(a) = &self.texcoords {
-            parts.extend([(a.values.hash(), a.values.bytes()), (a.corners.hash(), a.corners.bytes())]);
+            parts.extend([entry(&a.values), entry(&a.corners)]);
         }
         if let Some(a) = &self.normals {
-            parts.extend([(a.values.hash(), a.values.bytes()), (a.corners.hash(), a.corners.bytes())]);
+            parts.extend([entry(&a.values), entry(&a.corners)]);
         }
-        if let Some(c) = &self.colors {
-            parts.push((c.hash(), c.bytes()));
-        }
-        parts.extend(self.materials.iter().map(|m| (m.hash(), m.bytes())));
+        parts.extend(self.colors.as_ref().map(entry));
+        parts.extend(self.materials.iter().map(entry));
         let mut seen = HashSet::new();
-        let textures = self.textures().map(|t| (t.hash(), t.bytes()));
-        parts.extend(textures.filter(|(hash, _)| seen.insert(*hash)));
+        parts.extend(self.textures().filter(|texture| seen.insert(texture.hash())).map(entry));
         parts
     }
 

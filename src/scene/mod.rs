@@ -18,6 +18,6 @@ pub use geometry::{
 };
 pub use light::{Falloff, Light};
 pub use material::{Material, Textures};
-pub use part::{Content, Part, PartHash, PartHasher};
+pub use part::{Content, Part, PartHash, PartHasher, SharedPart};
 pub use shot::{Aov, AovSet, Background, Filter, Shot};
 pub use texture::{Channel, Map, Reflection, TexelSpace, Texels, Texture};

@@ -1,5 +1,6 @@
 //! Parts: immutable, shared values named by a 128-bit hash of their content (XXH3).
 
+use std::any::Any;
 use std::fmt;
 use std::ops::Deref;
 use std::sync::Arc;
@@ -106,6 +107,16 @@ impl<T: Content> Part<T> {
     /// Bytes that the content takes in memory.
     pub fn bytes(&self) -> u64 {
         self.0.value.bytes()
+    }
+}
+
+/// A part of whatever content, for those who only keep it.
+pub type SharedPart = Arc<dyn Any + Send + Sync>;
+
+impl<T: Send + Sync + 'static> Part<T> {
+    /// The part without its kind.
+    pub fn shared(&self) -> SharedPart {
+        self.0.clone()
     }
 }
 

@@ -1,25 +1,22 @@
-//! What the CPU device holds: the parts of the frame that was applied last, shared with whoever read them, and trees.
+//! What the CPU device holds: parts, shared with whoever read them, and trees.
 
 use crate::accel::{Quality, TracedObject, TracedScene, Tree};
 use crate::clock::Stopwatch;
 use crate::device::{DeviceError, DeviceInfo, UpdateCost};
 use crate::plan::{Action, Residency, Step, TreeState, UpdatePlan, tree_name};
-use crate::scene::{Frame, Geometry, PartHash};
+use crate::scene::{Frame, Geometry, PartHash, SharedPart};
 use crate::store::{Key, Store};
 use rayon::ThreadPool;
 use std::collections::HashMap;
 use std::sync::Arc;
-
-/// What a tree is taken to need for each triangle before it is built; real scenes take 70 to 90.
-const TREE_BYTES_PER_TRIANGLE: u64 = 100;
 
 /// Parts and trees.
 #[derive(Debug, Default)]
 pub(super) struct Resident {
     residency: Residency,
     trees: HashMap<PartHash, Arc<Tree>>,
-    /// Keeps the parts in memory.
-    parts: Vec<Arc<Geometry>>,
+    /// The parts, shared with whoever read them.
+    parts: HashMap<PartHash, SharedPart>,
     /// Has shapes of trees.
     pub(super) store: Option<Arc<Store>>,
 }
@@ -38,20 +35,27 @@ impl Resident {
         pool: &ThreadPool,
         device: &DeviceInfo,
     ) -> Result<UpdateCost, DeviceError> {
-        let needed_bytes = plan.needed_bytes(&self.residency, TREE_BYTES_PER_TRIANGLE);
+        let needed_bytes = plan.needed_bytes(&self.residency);
         refuse_beyond(device, needed_bytes)?;
-        self.parts = frame.objects.iter().map(|o| Arc::clone(&o.geometry)).collect();
+        let mut of_frame: HashMap<_, _> =
+            frame.objects.iter().flat_map(|o| o.geometry.shared_parts()).collect();
+        self.residency.begin();
         let mut cost = UpdateCost::default();
         let start = Stopwatch::start();
         for step in &plan.steps {
             match *step {
                 Step::Free { name } => {
-                    self.trees.remove(&name);
+                    self.forget(name);
                     self.residency.free(name);
                 }
-                Step::Keep { .. } => self.residency.keep(),
+                Step::Evict { name } => {
+                    self.forget(name);
+                    self.residency.evict(name);
+                }
+                Step::Keep { name } => self.residency.keep(name),
                 Step::Upload { part, bytes } => {
                     cost.uploaded_bytes += bytes;
+                    self.parts.extend(of_frame.remove_entry(&part));
                     self.residency.hold(part, bytes);
                 }
                 Step::Refit { from, tree: name, object, keep_up_to, .. } => {
@@ -63,7 +67,7 @@ impl Resident {
                         // no trace is under way, so that nobody else holds it and nothing is copied
                         let in_place = Arc::make_mut(&mut tree);
                         pool.install(|| in_place.refit(&geometry.positions.0, &geometry.triangles.0));
-                        self.residency.refit(from, name, in_place.cost());
+                        self.residency.refit(from, name, geometry, in_place.cost());
                         self.trees.insert(name, tree);
                         self.residency.trees.get(&name).is_some_and(|s| s.ratio() <= keep_up_to)
                     });
@@ -83,6 +87,7 @@ impl Resident {
                 }
             }
         }
+        self.residency.end(&plan.again);
         let update_ms = cost.built.ms + cost.refitted.ms;
         cost.upload_ms = Some(start.ms() - update_ms);
         cost.update_ms = Some(update_ms);
@@ -102,12 +107,24 @@ impl Resident {
         let start = Stopwatch::start();
         let tree = pool.install(|| stored_or_built(name, geometry, store));
         // many small objects may need more than the estimate
+        for (idle, _) in self.residency.idle() {
+            if self.residency.bytes() + tree.bytes() <= device.budget_bytes {
+                break;
+            }
+            self.forget(idle);
+            self.residency.evict(idle);
+        }
         refuse_beyond(device, self.residency.bytes() + tree.bytes())?;
         let state = TreeState::built(geometry, tree.cost());
         self.residency.hold_tree(name, tree.bytes(), state);
         self.trees.insert(name, Arc::new(tree));
         cost.built.add(geometry.triangles.0.len() as u64, start.ms());
         Ok(())
+    }
+
+    fn forget(&mut self, name: PartHash) {
+        self.parts.remove(&name);
+        self.trees.remove(&name);
     }
 
     /// Mean over the trees by triangles.

@@ -1,0 +1,154 @@
+//! What a device holds, and what of it was used when.
+
+use crate::scene::{Geometry, PartHash};
+use std::collections::{BTreeMap, BTreeSet};
+
+/// What a tree is taken to need for each triangle before it is built; real scenes take 70 to 90.
+pub const TREE_BYTES_PER_TRIANGLE: u64 = 100;
+
+/// What is known of a tree that a device holds.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TreeState {
+    /// The faces that it stands over.
+    pub faces: PartHash,
+    /// All parts of the object that it stands for: where the tree is overwritten by a refit or a build, they are too.
+    pub parts: Vec<PartHash>,
+    /// Triangles.
+    pub triangles: u64,
+    /// Surface-area cost when it was built.
+    pub built_cost: f64,
+    /// Surface-area cost now.
+    pub cost: f64,
+    /// Sum over the frames since the build of [`Self::ratio`] − 1.
+    pub excess: f64,
+}
+
+impl TreeState {
+    /// Of a tree that was just built.
+    pub fn built(geometry: &Geometry, cost: f64) -> Self {
+        let triangles = geometry.triangles.0.len() as u64;
+        let parts = geometry.parts().into_iter().map(|(name, _)| name).collect();
+        Self { faces: geometry.faces.hash(), parts, triangles, built_cost: cost, cost, excess: 0.0 }
+    }
+
+    /// The same after a refit to a geometry that has this cost.
+    #[must_use]
+    pub fn refitted(mut self, geometry: &Geometry, cost: f64) -> Self {
+        self.parts = geometry.parts().into_iter().map(|(name, _)| name).collect();
+        self.cost = cost;
+        self.excess = (self.excess + self.ratio() - 1.0).max(0.0);
+        self
+    }
+
+    /// The surface-area cost over that of the last build; 1 where there is none.
+    pub fn ratio(&self) -> f64 {
+        if self.cost <= 0.0 {
+            1.0
+        } else if self.built_cost <= 0.0 {
+            f64::INFINITY
+        } else {
+            self.cost / self.built_cost
+        }
+    }
+}
+
+/// A part or tree that is held.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Held {
+    /// Its bytes.
+    pub bytes: u64,
+    /// The turn, counted in frames, in which it was used last.
+    pub last_used: u64,
+    /// Whether a frame that is known to come will use it.
+    pub again: bool,
+}
+
+/// What a device holds: parts and trees, and the counts of the report.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Residency {
+    /// By name; trees stand under [`super::tree_name`].
+    pub held: BTreeMap<PartHash, Held>,
+    /// What is known of the trees among them.
+    pub trees: BTreeMap<PartHash, TreeState>,
+    /// Frames that were made resident.
+    pub turn: u64,
+    /// The most bytes ever held.
+    pub peak_bytes: u64,
+    /// Parts and trees that were there when a frame needed them.
+    pub hits: u64,
+    /// Those that were not.
+    pub misses: u64,
+    /// Those given up for want of space.
+    pub evictions: u64,
+}
+
+impl Residency {
+    /// Bytes held now.
+    pub fn bytes(&self) -> u64 {
+        self.held.values().map(|held| held.bytes).sum()
+    }
+
+    /// A frame's turn begins.
+    pub fn begin(&mut self) {
+        self.turn += 1;
+    }
+
+    /// A part or tree was there when a frame needed it.
+    pub fn keep(&mut self, name: PartHash) {
+        self.hits += 1;
+        if let Some(held) = self.held.get_mut(&name) {
+            held.last_used = self.turn;
+        }
+    }
+
+    /// A part or tree was not there and is now held.
+    pub fn hold(&mut self, name: PartHash, bytes: u64) {
+        self.misses += 1;
+        self.held.insert(name, Held { bytes, last_used: self.turn, again: false });
+        self.peak_bytes = self.peak_bytes.max(self.bytes());
+    }
+
+    /// A tree was built.
+    pub fn hold_tree(&mut self, name: PartHash, bytes: u64, state: TreeState) {
+        self.hold(name, bytes);
+        self.trees.insert(name, state);
+    }
+
+    /// A tree was fitted to a geometry's positions and has another name now; it counts as there.
+    pub fn refit(&mut self, from: PartHash, to: PartHash, geometry: &Geometry, cost: f64) {
+        self.hits += 1;
+        if let (Some(held), Some(state)) = (self.held.remove(&from), self.trees.remove(&from)) {
+            self.held.insert(to, Held { last_used: self.turn, ..held });
+            self.trees.insert(to, state.refitted(geometry, cost));
+        }
+    }
+
+    /// Gives up a part or tree.
+    pub fn free(&mut self, name: PartHash) {
+        self.held.remove(&name);
+        self.trees.remove(&name);
+    }
+
+    /// Gives up a part or tree that a frame to come will use.
+    pub fn evict(&mut self, name: PartHash) {
+        self.evictions += 1;
+        self.free(name);
+    }
+
+    /// The frame's turn ends: which of what it uses will be used again.
+    pub fn end(&mut self, again: &BTreeSet<PartHash>) {
+        for (name, held) in &mut self.held {
+            if held.last_used == self.turn {
+                held.again = again.contains(name);
+            }
+        }
+    }
+
+    /// What this turn's frame does not use, the least recently used first, with the bytes.
+    pub fn idle(&self) -> Vec<(PartHash, u64)> {
+        let idle = self.held.iter().filter(|(_, held)| held.last_used < self.turn);
+        let mut idle: Vec<_> = idle.map(|(name, held)| (held.last_used, *name, held.bytes)).collect();
+        idle.sort_unstable();
+        idle.into_iter().map(|(_, name, bytes)| (name, bytes)).collect()
+    }
+}
