@@ -4,7 +4,7 @@
 //! What a hit is stands in `slab` and `triangle`, written once over `lanes`; [`BruteForce`] applies it to one triangle
 //! after the other. A tree's shape comes from obvhs (`binary`), made eight wide (`collapse`); its boxes are fitted from
 //! below (`fit`). Rays go through it one by one (`traverse`) or sixteen at a time (`interval`, `packet`), and through
-//! objects that stand somewhere in the world (`placement`, `traced`).
+//! objects that stand somewhere in the world (`placement`, `traced`), many of them by a level of their own (`top`).
 
 // Formulas over lanes must be inlined into the functions that enable the lanes' CPU feature, or they would be compiled
 // without it.
@@ -22,6 +22,7 @@ mod placement;
 mod slab;
 mod stack;
 mod stored;
+mod top;
 mod traced;
 mod traverse;
 mod tree;

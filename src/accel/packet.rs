@@ -7,7 +7,7 @@ use super::interval::{Interval, PacketSlabs, RAYS, greatest};
 use super::lanes::Lanes8;
 use super::stack::{Stack, Waiting};
 use super::traverse::{Found, search_block};
-use super::tree::{LEAF, Tree, WIDTH};
+use super::tree::{LEAF, Node, Tree, WIDTH};
 use super::triangle::{Search, ShearRay};
 
 impl Tree {
@@ -29,7 +29,7 @@ impl Tree {
         let mut last_end = greatest::<L>(&ends);
         let mut stack = Stack::new();
         if !self.nodes.is_empty() {
-            self.push_children(0, &slabs.interval, last_end, &mut stack);
+            push_children(&self.nodes, 0, &slabs.interval, last_end, &mut stack);
         }
         if stack.len() == 0 {
             return true;
@@ -52,7 +52,7 @@ impl Tree {
             }
             let child = parent.children[lane];
             if child & LEAF == 0 {
-                self.push_children(child as usize, &slabs.interval, last_end, &mut stack);
+                push_children(&self.nodes, child as usize, &slabs.interval, last_end, &mut stack);
                 continue;
             }
             let block = &self.blocks[(child & !LEAF) as usize];
@@ -76,18 +76,25 @@ impl Tree {
             }
         }
     }
+}
 
-    /// Adds the children that a ray may enter not after a distance, as the number of the node times eight plus the lane.
-    #[inline(always)]
-    fn push_children<L: Lanes8>(&self, node: usize, interval: &Interval<L>, end: f32, stack: &mut Stack) {
-        let (entry, exit) = interval.pass(&self.nodes[node].planes);
-        let mut entered = entry.le(L::splat(end).min(exit));
-        let entries = entry.store();
-        let floor = stack.len();
-        while entered != 0 {
-            let lane = entered.trailing_zeros() as usize % WIDTH;
-            entered &= entered - 1;
-            stack.insert(Waiting::new(entries[lane], (node * WIDTH + lane) as u32), floor);
-        }
+/// Adds the children of a node that a ray may enter not after a distance, as the number of the node times eight plus the
+/// lane.
+#[inline(always)]
+pub(crate) fn push_children<L: Lanes8>(
+    nodes: &[Node],
+    node: usize,
+    interval: &Interval<L>,
+    end: f32,
+    stack: &mut Stack,
+) {
+    let (entry, exit) = interval.pass(&nodes[node].planes);
+    let mut entered = entry.le(L::splat(end).min(exit));
+    let entries = entry.store();
+    let floor = stack.len();
+    while entered != 0 {
+        let lane = entered.trailing_zeros() as usize % WIDTH;
+        entered &= entered - 1;
+        stack.insert(Waiting::new(entries[lane], (node * WIDTH + lane) as u32), floor);
     }
 }

@@ -1,11 +1,14 @@
 //! The traced scene of the CPU: trees, each where its object stands.
 
-use super::interval::RAYS;
-use super::lanes::{Lanes8, Portable, Width};
+use super::interval::{PacketSlabs, RAYS};
+use super::lanes::{Lanes, Lanes8, Portable, Width};
+use super::packet::push_children;
 use super::placement::Placement;
-use super::slab::SlabRay;
-use super::traverse::Found;
-use super::tree::Tree;
+use super::slab::{Aabb, SlabRay};
+use super::stack::Stack;
+use super::top::TopLevel;
+use super::traverse::{Found, nearest_child};
+use super::tree::{LEAF, Tree, WIDTH};
 use super::triangle::Search;
 use super::{Aggregate, Hit, HitOrder, Ray};
 use crate::math::DAffine3;
@@ -39,12 +42,10 @@ impl TracedObject {
         self.placement.as_ref().map_or(*ray, |p| p.object_ray(ray))
     }
 
+    /// A box in the world that the ray enters not after any of the object's triangles.
     #[inline(always)]
-    fn entry(&self, ray: &Ray, slab: &SlabRay<f32>) -> Option<f32> {
-        match &self.placement {
-            None => slab.entry(&self.tree.bounds),
-            Some(p) => slab.entry(&p.box_for(ray)),
-        }
+    fn box_for(&self, ray: &Ray) -> Aabb {
+        self.placement.as_ref().map_or(self.tree.bounds, |p| p.box_for(ray))
     }
 }
 
@@ -56,6 +57,7 @@ type FoundIn = (usize, Found);
 #[derive(Clone, Debug)]
 pub struct TracedScene {
     objects: Vec<TracedObject>,
+    top: Option<TopLevel>,
     width: Width,
 }
 
@@ -67,7 +69,8 @@ impl TracedScene {
             object.first_primitive = first_primitive;
             first_primitive = first_primitive.wrapping_add(object.tree.triangle_count());
         }
-        Self { objects, width: Width::detect() }
+        let top = TopLevel::build(objects.len(), |i, ray| objects[i].box_for(ray));
+        Self { objects, top, width: Width::detect() }
     }
 
     /// Traces in another width; one that the machine lacks is not taken. The answers are the same.
@@ -89,6 +92,47 @@ impl TracedScene {
         if let [TracedObject { tree, placement: None, .. }] = &self.objects[..] {
             return tree.search::<L, ANY>(ray, 0, search).map(|triangle| (0, triangle));
         }
+        match self.top.as_ref().filter(|top| top.covers(ray)) {
+            Some(top) => self.search_below::<L, ANY>(top, ray, search),
+            None => self.search_in_turn::<L, ANY>(ray, search),
+        }
+    }
+
+    #[inline(always)]
+    fn search_below<L: Lanes8, const ANY: bool>(
+        &self,
+        top: &TopLevel,
+        ray: &Ray,
+        search: &mut Search,
+    ) -> Option<FoundIn> {
+        let slab = SlabRay::<L>::new(ray);
+        let mut stack = Stack::new();
+        let mut next = nearest_child(top.nodes.first()?, &slab, search.before.distance, &mut stack);
+        let mut found = None;
+        loop {
+            let child = match next {
+                Some(child) => child,
+                None => match stack.pop_before(search.before.distance) {
+                    Some(child) => child,
+                    None => return found,
+                },
+            };
+            if child & LEAF == 0 {
+                next = nearest_child(&top.nodes[child as usize], &slab, search.before.distance, &mut stack);
+                continue;
+            }
+            next = None;
+            if let Some(nearer) = self.search_object::<L, ANY>((child & !LEAF) as usize, ray, search) {
+                found = Some(nearer);
+                if ANY {
+                    return found;
+                }
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn search_in_turn<L: Lanes8, const ANY: bool>(&self, ray: &Ray, search: &mut Search) -> Option<FoundIn> {
         let slab = SlabRay::new(ray);
         let mut found = None;
         for (chunk, objects) in self.objects.chunks(SORTED).enumerate() {
@@ -97,10 +141,8 @@ impl TracedScene {
                 if entry > search.before.distance {
                     break;
                 }
-                let object = &objects[i];
-                let ray = object.own_ray(ray);
-                if let Some(triangle) = object.tree.search::<L, ANY>(&ray, object.first_primitive, search) {
-                    found = Some((chunk * SORTED + i, triangle));
+                if let Some(nearer) = self.search_object::<L, ANY>(chunk * SORTED + i, ray, search) {
+                    found = Some(nearer);
                     if ANY {
                         return found;
                     }
@@ -108,6 +150,18 @@ impl TracedScene {
             }
         }
         found
+    }
+
+    #[inline(always)]
+    fn search_object<L: Lanes8, const ANY: bool>(
+        &self,
+        i: usize,
+        ray: &Ray,
+        search: &mut Search,
+    ) -> Option<FoundIn> {
+        let object = &self.objects[i];
+        let ray = object.own_ray(ray);
+        object.tree.search::<L, ANY>(&ray, object.first_primitive, search).map(|triangle| (i, triangle))
     }
 
     /// [`Self::search`] for rays that are coherent.
@@ -118,21 +172,54 @@ impl TracedScene {
         searches: &mut [Search; RAYS],
         found: &mut [Option<FoundIn>; RAYS],
     ) {
-        for (i, object) in self.objects.iter().enumerate() {
-            let mut own_rays = [rays[0]; RAYS];
-            for (own, ray) in own_rays.iter_mut().zip(rays) {
-                *own = object.own_ray(ray);
+        let top = self.top.as_ref().filter(|top| rays.iter().all(|ray| top.covers(ray)));
+        let Some((top, slabs)) = top.and_then(|top| Some((top, PacketSlabs::<L>::new(rays)?))) else {
+            for i in 0..self.objects.len() {
+                self.search_object_packet::<L, ANY>(i, rays, searches, found);
             }
-            let own_rays = &own_rays[..rays.len()];
-            let first = object.first_primitive;
-            let note = |ray: usize, triangle| found[ray] = Some((i, triangle));
-            if !object.tree.search_packet::<L, ANY>(own_rays, first, searches, note) {
-                for (k, ray) in own_rays.iter().enumerate() {
-                    if let Some(triangle) = object.tree.search::<L, ANY>(ray, first, &mut searches[k]) {
-                        found[k] = Some((i, triangle));
-                        if ANY {
-                            searches[k].end();
-                        }
+            return;
+        };
+        let last_end = |searches: &[Search; RAYS]| {
+            searches[..rays.len()].iter().map(|s| s.before.distance).fold(f32::NEG_INFINITY, Lanes::max)
+        };
+        let mut end = last_end(searches);
+        let mut stack = Stack::new();
+        if !top.nodes.is_empty() {
+            push_children(&top.nodes, 0, &slabs.interval, end, &mut stack);
+        }
+        while let Some(waiting) = stack.pop_before(end) {
+            let child = top.nodes[waiting as usize / WIDTH].children[waiting as usize % WIDTH];
+            if child & LEAF == 0 {
+                push_children(&top.nodes, child as usize, &slabs.interval, end, &mut stack);
+            } else {
+                self.search_object_packet::<L, ANY>((child & !LEAF) as usize, rays, searches, found);
+                end = last_end(searches);
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn search_object_packet<L: Lanes8, const ANY: bool>(
+        &self,
+        i: usize,
+        rays: &[Ray],
+        searches: &mut [Search; RAYS],
+        found: &mut [Option<FoundIn>; RAYS],
+    ) {
+        let object = &self.objects[i];
+        let mut own_rays = [rays[0]; RAYS];
+        for (own, ray) in own_rays.iter_mut().zip(rays) {
+            *own = object.own_ray(ray);
+        }
+        let own_rays = &own_rays[..rays.len()];
+        let first = object.first_primitive;
+        let note = |ray: usize, triangle| found[ray] = Some((i, triangle));
+        if !object.tree.search_packet::<L, ANY>(own_rays, first, searches, note) {
+            for (k, ray) in own_rays.iter().enumerate() {
+                if let Some(triangle) = object.tree.search::<L, ANY>(ray, first, &mut searches[k]) {
+                    found[k] = Some((i, triangle));
+                    if ANY {
+                        searches[k].end();
                     }
                 }
             }
@@ -187,7 +274,7 @@ fn by_entry(objects: &[TracedObject], ray: &Ray, slab: &SlabRay<f32>) -> ([(f32,
     let mut sorted = [(0.0, 0); SORTED];
     let mut count = 0;
     for (i, object) in objects.iter().enumerate() {
-        let Some(entry) = object.entry(ray, slab) else { continue };
+        let Some(entry) = slab.entry(&object.box_for(ray)) else { continue };
         let mut place = count;
         while place > 0 && sorted[place - 1].0 > entry {
             sorted[place] = sorted[place - 1];
@@ -270,6 +357,84 @@ impl Aggregate for TracedScene {
             // SAFETY: the width is one of those that were found available
             Width::Avx2 => unsafe { avx2::occluded_batch(self, rays, ends, occluded) },
             _ => self.search_any_batch::<Portable>(rays, ends, occluded),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::accel::Quality;
+    use crate::math::{DVec3, Vec3};
+    use glam::DQuat;
+
+    /// Numbers in [-1, 1): the fractional parts of multiples of the golden ratio.
+    fn numbers() -> impl FnMut() -> f64 {
+        let mut n = 0.0_f64;
+        move || {
+            n += 1.0;
+            2.0 * (n * 0.618_033_988_749_894_9).fract() - 1.0
+        }
+    }
+
+    /// Fans of triangles all over the place; some stand as they are, one can never be hit, some lie in one another.
+    fn objects(count: usize) -> Vec<TracedObject> {
+        let mut next = numbers();
+        let mut vector = move |s: f64| DVec3::new(next() * s, next() * s, next() * s);
+        let points: Vec<[f32; 3]> = (0..30).map(|_| vector(1.0).as_vec3().to_array()).collect();
+        let triangles: Vec<[u32; 3]> = (0..28).map(|i| [i, i + 1, i + 2]).collect();
+        let tree = Arc::new(Tree::build(&points, &triangles, Quality::default()));
+        let place = |i: usize| match i % 11 {
+            0 => None,
+            1 => Some(DAffine3::from_scale(DVec3::ZERO)),
+            _ => {
+                let turn = DQuat::from_axis_angle(vector(1.0).normalize(), 3.0 * i as f64);
+                let size = DVec3::splat(0.3) + 0.2 * vector(1.0);
+                Some(DAffine3::from_scale_rotation_translation(size, turn, vector(8.0)))
+            }
+        };
+        (0..count)
+            .map(place)
+            .collect::<Vec<_>>()
+            .iter()
+            .map(|m| TracedObject::new(Arc::clone(&tree), m.as_ref()))
+            .collect()
+    }
+
+    #[test]
+    fn with_a_level_above_the_hits_are_those_without() {
+        for count in [5, 8, 9, 64, 65, 300] {
+            let with = TracedScene::new(objects(count));
+            assert!(with.top.is_some());
+            let without = TracedScene { top: None, ..with.clone() };
+            let mut next = numbers();
+            let mut vector = move |s: f64| DVec3::new(next() * s, next() * s, next() * s).as_vec3();
+            let mut seen = 0;
+            for i in 0..300 {
+                // from within, from outside, from farther away than the level above covers
+                let origin = vector([4.0, 30.0, 1e5][i % 3]);
+                let to = vector(8.0);
+                let rays: [Ray; RAYS] = std::array::from_fn(|k| {
+                    let aside = Vec3::new((k % 4) as f32, (k / 4) as f32, 0.0) * 0.05;
+                    Ray { origin, direction: to + aside - origin }
+                });
+                let mut hits = [[None; RAYS]; 2];
+                let mut shadows = [[false; RAYS]; 2];
+                for (k, scene) in [&with, &without].into_iter().enumerate() {
+                    scene.closest_batch(&rays, &mut hits[k]);
+                    scene.occluded_batch(&rays, &[0.9; RAYS], &mut shadows[k]);
+                }
+                assert_eq!(hits[0], hits[1]);
+                assert_eq!(shadows[0], shadows[1]);
+                for (ray, hit) in rays.iter().zip(hits[0]) {
+                    assert_eq!(with.closest(ray, None), hit);
+                    assert_eq!(with.occluded(ray, 0.9), without.occluded(ray, 0.9));
+                    let after = hit.map(|hit| with.order(&hit));
+                    assert_eq!(with.closest(ray, after), without.closest(ray, after));
+                    seen += usize::from(hit.is_some());
+                }
+            }
+            assert!(seen > 100, "{count}: {seen}");
         }
     }
 }

@@ -61,7 +61,12 @@ impl Tree {
 
 /// The child that a ray enters first of those that it enters not after a distance; the others wait.
 #[inline(always)]
-fn nearest_child<L: Lanes8>(node: &Node, slab: &SlabRay<L>, distance: f32, stack: &mut Stack) -> Option<u32> {
+pub(crate) fn nearest_child<L: Lanes8>(
+    node: &Node,
+    slab: &SlabRay<L>,
+    distance: f32,
+    stack: &mut Stack,
+) -> Option<u32> {
     let [sx, sy, sz] = slab.near_side;
     let planes = &node.planes;
     let (entry, exit) = slab.pass(
