@@ -3,7 +3,7 @@
 use super::RunOptions;
 use super::animation::Views;
 use super::read::read_options;
-use super::source::Sources;
+use super::source::{Place, Sources};
 use crate::format::{self, FormatError, Gltf};
 use crate::job::{Background, CameraChoice, FrameFile, Job, Layer, LightChoice, Picture, Sequence, auto};
 use crate::math::{Bounds, DVec3};
@@ -164,7 +164,10 @@ fn first_objects(sequence: &Sequence, options: &RunOptions, sources: &Sources) -
                 views.cameras.extend(shown.views.cameras);
                 views.lights.extend(shown.views.lights);
             }
-        } else if let Ok(loaded) = sources.ahead(&file.path, &read) {
+            continue;
+        }
+        let place = if layer.files.len() == 1 { Place::Only } else { Place::First };
+        if let Ok(loaded) = sources.ahead(&file.path, &read, place) {
             objects.push(Object { geometry: Arc::clone(&loaded.geometry), transform: source.transform });
         }
     }
