@@ -14,7 +14,7 @@ mod triple;
 
 use crate::clock::Stopwatch;
 use crate::math::Bounds;
-use crate::scene::Geometry;
+use crate::scene::{Geometry, PartHash};
 use crate::store::Store;
 use crate::warning::Warnings;
 use std::path::{Path, PathBuf};
@@ -182,6 +182,11 @@ pub fn scan_bounds(path: &Path) -> Result<Bounds, FormatError> {
     let mut bounds = Bounds::EMPTY;
     text::read_pieces(path, |text| obj::add_to_bounds(&mut bounds, text))?;
     Ok(bounds)
+}
+
+/// A name for the content of a file.
+pub fn digest(path: &Path) -> Result<PartHash, FormatError> {
+    text::digest(path).map(|(hash, _)| hash)
 }
 
 /// The libraries that an OBJ names and the maps of all materials, as far as they are there; the buffers and images of a
