@@ -195,7 +195,13 @@ pub fn named_files(path: &Path, options: &ReadOptions) -> Vec<PathBuf> {
     if is_gltf(path) {
         return gltf::named_files(path);
     }
-    let Ok(bytes) = text::read(path) else { return Vec::new() };
-    let Ok(text) = Text::new(&bytes, path) else { return Vec::new() };
-    library::Loader::new(path, options).named_files(&obj::library_statements(&text))
+    let mut libraries: Vec<Vec<u8>> = Vec::new();
+    let read = text::read_pieces(path, |text| {
+        libraries.extend(obj::library_statements(text).into_iter().map(<[u8]>::to_vec));
+    });
+    if read.is_err() {
+        return Vec::new();
+    }
+    let libraries: Vec<&[u8]> = libraries.iter().map(Vec::as_slice).collect();
+    library::Loader::new(path, options).named_files(&libraries)
 }

@@ -64,7 +64,9 @@ fn through<E>(
     let Some(digests) = digests.flatten() else { return scan() };
     let mut h = PartHasher::new(STORED);
     h.bytes(env!("CARGO_PKG_VERSION").as_bytes());
-    digests.into_iter().for_each(|digest| h.part(digest));
+    for digest in digests {
+        h.part(digest);
+    }
     let key = Key(h.finish().0);
     let stored = store.get(STORED, key, |payload| {
         let corners: Vec<[[f64; 3]; 2]> = payload.values(paths.len())?;

@@ -74,7 +74,9 @@ impl Entry {
         let unfinished = folder.join(format!("{}{}-{number}", super::folder::UNFINISHED, std::process::id()));
         let length = payload.iter().map(|bytes| bytes.len() as u64).sum();
         let mut hasher = self.hasher();
-        payload.iter().for_each(|bytes| hasher.update(bytes));
+        for bytes in payload {
+            hasher.update(bytes);
+        }
         let written = File::create(&unfinished).and_then(|mut file| {
             file.write_all(&self.head(length, hasher.digest128()))?;
             payload.iter().try_for_each(|bytes| file.write_all(bytes))?;
