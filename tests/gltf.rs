@@ -6,24 +6,31 @@ mod common;
 
 use common::{assert_same, pictures, render, report};
 use rentix::format::{ClipChoice, Gltf, GltfOptions};
+use rentix::math::DVec3;
+use rentix::scene::Object;
 use std::collections::HashMap;
 use std::fmt::Write;
 use std::path::Path;
+use std::process::Command;
 
 /// The greatest distance from the oracle's place, of the diagonal of the model's box.
 const TOLERANCE: f64 = 1e-4;
 
-/// The world positions of all vertices in order.
+/// The world positions of all vertices in order, by object.
+fn objects(gltf: &Gltf, time_s: f64, clip: &ClipChoice) -> Vec<Vec<[f64; 3]>> {
+    let frame = gltf.frame(time_s, clip).expect("a sample model can be shown");
+    let places = |object: &Object| {
+        let world = |p: &[f32; 3]| {
+            let p = DVec3::from_array(p.map(f64::from));
+            object.transform.map_or(p, |world| world.transform_point3(p)).to_array()
+        };
+        object.geometry.positions.0.iter().map(world).collect()
+    };
+    frame.objects.iter().map(places).collect()
+}
+
 fn vertices(gltf: &Gltf, time_s: f64) -> Vec<[f64; 3]> {
-    let frame = gltf.frame(time_s, &ClipChoice::Auto).expect("a sample model can be shown");
-    let mut all = Vec::new();
-    for object in &frame.objects {
-        for p in &object.geometry.positions.0 {
-            let p = rentix::math::DVec3::from_array(p.map(f64::from));
-            all.push(object.transform.map_or(p, |world| world.transform_point3(p)).to_array());
-        }
-    }
-    all
+    objects(gltf, time_s, &ClipChoice::Auto).concat()
 }
 
 #[test]
@@ -65,6 +72,52 @@ fn poses_agree_with_numpy() {
         lines += 1;
     }
     eprintln!("{lines} poses, the greatest distance is {:.1e} of the box ({})", worst.0, worst.1);
+}
+
+/// `RENTIX_BLENDER_PYTHON=PYTHON cargo test --release --test gltf -- --ignored --nocapture blender`, where PYTHON is one
+/// with Blender in it (`pip install bpy`) and `RENTIX_SCENES` names the models' folder.
+#[test]
+#[ignore = "needs Blender as a module of Python"]
+fn poses_agree_with_blender() {
+    let needed = |name: &str| {
+        std::env::var(name).unwrap_or_else(|_| panic!("{name} must be set, see the test's head"))
+    };
+    let (python, folder) =
+        (needed("RENTIX_BLENDER_PYTHON"), Path::new(&needed("RENTIX_SCENES")).join("gltf"));
+    let script = |args: &[&Path]| -> String {
+        let ran = Command::new(&python)
+            .arg(Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/gltf_blender.py"))
+            .args(args)
+            .output()
+            .unwrap_or_else(|error| panic!("{python}: {error}"));
+        assert!(ran.status.success(), "{}", String::from_utf8_lossy(&ran.stderr));
+        String::from_utf8_lossy(&ran.stdout).into_owned()
+    };
+    let t = tempfile::tempdir().unwrap();
+    let cases = script(&[Path::new("cases"), &folder]);
+    for (i, case) in cases.lines().enumerate() {
+        let (name, times) = case.split_once(' ').expect("a line names its model");
+        let times: Vec<f64> = times.split(' ').map(|time| time.parse().unwrap()).collect();
+        let gltf = Gltf::open(&folder.join(name), &GltfOptions::default()).unwrap();
+        let first = ClipChoice::Named("0".to_owned());
+        let poses: Vec<_> = times.iter().map(|&time_s| objects(&gltf, time_s, &first)).collect();
+        let counts = poses[0].iter().map(|object| object.len() as u64);
+        let mut bytes: Vec<u8> = [poses.len() as u64, poses[0].len() as u64]
+            .into_iter()
+            .chain(counts)
+            .flat_map(u64::to_le_bytes)
+            .collect();
+        bytes.extend(poses.concat().concat().as_flattened().iter().flat_map(|x| x.to_le_bytes()));
+        std::fs::write(t.path().join(i.to_string()), bytes).unwrap();
+    }
+    let told = script(&[Path::new("compare"), &folder, t.path()]);
+    let told: Vec<&str> = told.lines().filter_map(|line| line.strip_prefix("pose ")).collect();
+    eprintln!("{}", told.join("\n"));
+    assert!(!told.is_empty() && told.len() == cases.lines().count());
+    for line in told {
+        let worst: f64 = line.split(' ').nth(1).and_then(|word| word.parse().ok()).expect("a distance");
+        assert!(worst < TOLERANCE, "{line}");
+    }
 }
 
 /// A triangle that moves by (0, 0, −1) in a second, a camera that looks at it, and a lamp, in one file of text.

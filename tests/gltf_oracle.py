@@ -210,4 +210,5 @@ def main(folder):
             print(f"{path.parent.name}/{path.name} {t!r} {len(p)} {numbers}")
 
 
-main(pathlib.Path(sys.argv[1]))
+if __name__ == "__main__":
+    main(pathlib.Path(sys.argv[1]))

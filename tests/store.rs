@@ -1,13 +1,14 @@
 //! The store on disk bears on time alone: pictures are the same without it, with it, with it damaged, full or gone.
 
 mod common;
-use common::{pictures, render, run, wave};
+use common::{pictures, render, report, run, wave};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-/// A textured wave of more triangles than a tree is kept for.
+/// A textured wave of more triangles than a tree is kept for, and more bytes than a file's shape; something is wrong with
+/// it.
 fn scene(folder: &Path) -> PathBuf {
-    let input = wave(&folder.join("w"), 2, 32, 40);
+    let input = wave(&folder.join("w"), 2, 64, 80);
     image::RgbImage::from_fn(64, 64, |x, y| image::Rgb([x as u8 * 4, y as u8 * 4, 99]))
         .save(input.join("t.png"))
         .unwrap();
@@ -15,7 +16,7 @@ fn scene(folder: &Path) -> PathBuf {
     for frame in 1..=2 {
         let obj = input.join(format!("wave_{frame:04}.obj"));
         let text = std::fs::read_to_string(&obj).unwrap();
-        let textured = "\nmtllib t.mtl\nusemtl m\nvt 0 0\nvt 1 0\nvt 0 1\nf 1/1 2/2 4/3\n";
+        let textured = "\nmtllib t.mtl no.mtl\nwrong\nl 1 2\nusemtl m\nvt 0 0\nvt 1 0\nvt 0 1\nf 1/1 2/2 4/3\nusemtl none\nf 1/9 2/9 3/9\n";
         std::fs::write(&obj, text + textured).unwrap();
     }
     input
@@ -40,6 +41,19 @@ fn shown(t: &Path, input: &Path, out: &str, more: &[&str]) -> (BTreeMap<String, 
     (pictures(&t.join(out)), said)
 }
 
+/// What a report says of what was read: all warnings, and of each frame what was read and is there.
+fn told(t: &Path, input: &Path, more: &[&str]) -> String {
+    let path = t.join("r.json");
+    let options = ["--overwrite", "--report", path.to_str().unwrap()];
+    render(t, input, "told", &[&SIZE, &options[..], more].concat(), 0);
+    let report = report(&path);
+    let frames = report["frames"].as_array().unwrap();
+    let bytes: u64 = frames.iter().map(|f| f["bytes"]["read"].as_u64().unwrap()).sum();
+    let frames: Vec<_> =
+        frames.iter().map(|f| (&f["source"], &f["triangles"], &f["bytes"]["uploaded"])).collect();
+    format!("{} {bytes} {frames:?}", report["warnings"])
+}
+
 #[test]
 fn pictures_are_the_same_whatever_the_store_holds() {
     let t = tempfile::tempdir().unwrap();
@@ -54,8 +68,8 @@ fn pictures_are_the_same_whatever_the_store_holds() {
 
     assert!(shown(t, &input, "first", &[]).0 == without);
     let kept = entries(&store);
-    // a texture and a tree
-    assert_eq!(kept.len(), 2, "{kept:?}");
+    // a texture, a tree, and the shape in the file that was read first
+    assert_eq!(kept.len(), 3, "{kept:?}");
     assert!(shown(t, &input, "second", &[]).0 == without);
     assert_eq!(entries(&store), kept);
 
@@ -79,6 +93,35 @@ fn pictures_are_the_same_whatever_the_store_holds() {
         assert!(got == without && !said.contains("damaged"), "{damage}: {said}");
         assert_eq!(entries(&store), kept);
     }
+}
+
+#[test]
+fn the_same_is_told_whatever_the_store_holds() {
+    let t = tempfile::tempdir().unwrap();
+    let t = t.path();
+    let folder = scene(t);
+    // a folder's first frame is read for the next, one file for itself
+    for input in [folder.clone(), folder.join("wave_0001.obj")] {
+        let without = told(t, &input, &["--no-cache"]);
+        for word in ["unknown", "lines", "no.mtl", "texcoord"] {
+            assert!(without.contains(word), "{word}: {without}");
+        }
+        for _ in 0..3 {
+            assert_eq!(told(t, &input, &[]), without);
+        }
+    }
+    // what fails fails alike, and is not kept
+    let bad = folder.join("wave_0001.obj");
+    let kept = entries(&t.join("store")).len();
+    std::fs::write(&bad, std::fs::read_to_string(&bad).unwrap() + "f 1 2 999999\n").unwrap();
+    let said = |more: &[&str]| render(t, &bad, "bad", &[&SIZE, more].concat(), 1).stderr;
+    let without = said(&["--no-cache"]);
+    assert!(without.contains("999999") && said(&[]) == without && said(&[]) == without, "{without}");
+    assert_eq!(entries(&t.join("store")).len(), kept);
+    // but with --lenient it is read, and that is another thing
+    let without = told(t, &bad, &["--lenient", "--no-cache"]);
+    assert!(told(t, &bad, &["--lenient"]) == without && told(t, &bad, &["--lenient"]) == without);
+    assert_eq!(said(&[]), said(&["--no-cache"]));
 }
 
 #[test]
@@ -106,9 +149,9 @@ fn cache_tells_and_clears() {
         serde_json::from_str(&run.stdout).unwrap()
     };
     let bytes: u64 = entries(&t.join("store")).iter().map(|p| p.metadata().unwrap().len()).sum();
-    assert_eq!((&told("stat")["entries"], &told("stat")["bytes"]), (&2.into(), &bytes.into()));
+    assert_eq!((&told("stat")["entries"], &told("stat")["bytes"]), (&3.into(), &bytes.into()));
     assert_eq!(told("gc")["removed"]["entries"], 0);
-    assert_eq!((&told("clear")["removed"]["entries"], &told("stat")["entries"]), (&2.into(), &0.into()));
+    assert_eq!((&told("clear")["removed"]["entries"], &told("stat")["entries"]), (&3.into(), &0.into()));
     // what another put there is not touched
     std::fs::write(t.join("store/mine.txt"), "kept").unwrap();
     told("clear");

@@ -1,4 +1,4 @@
-//! The shape of a tree as bytes: what a build decides; boxes and corners follow from the mesh.
+//! The shape of a tree as words: what a build decides; boxes and corners follow from the mesh.
 
 use super::collapse::Shape;
 use super::tree::{LEAF, MAX_DEPTH, NO_CHILD, NO_TRIANGLE, Tree, WIDTH};
@@ -8,31 +8,29 @@ const HEAD: usize = 3;
 
 impl Tree {
     /// Its shape, for [`Tree::from_shape`].
-    pub fn shape_bytes(&self) -> Vec<u8> {
+    pub fn shape(&self) -> Vec<u32> {
         let mut words = vec![self.nodes.len() as u32, self.blocks.len() as u32, self.levels.len() as u32];
         words.extend(self.levels.iter().map(|level| level.end as u32));
         words.extend(self.nodes.iter().flat_map(|node| node.children));
         words.extend(self.blocks.iter().flat_map(|block| block.triangles));
-        words.into_iter().flat_map(u32::to_le_bytes).collect()
+        words
     }
 
-    /// A tree of that shape over a mesh of which each triangle stands in some leaf; None where the bytes are no shape of
+    /// A tree of that shape over a mesh of which each triangle stands in some leaf; None where the words are no shape of
     /// such a tree.
-    pub fn from_shape(bytes: &[u8], positions: &[[f32; 3]], triangles: &[[u32; 3]]) -> Option<Self> {
-        let shape = read(bytes)?;
+    pub fn from_shape(words: &[u32], positions: &[[f32; 3]], triangles: &[[u32; 3]]) -> Option<Self> {
+        let shape = read(words)?;
         is_sound(&shape, triangles.len()).then(|| Self::fit(shape, positions, triangles))
     }
 }
 
-fn read(bytes: &[u8]) -> Option<Shape> {
-    let (words, rest) = bytes.as_chunks::<4>();
-    let words: Vec<u32> = words.iter().map(|word| u32::from_le_bytes(*word)).collect();
+fn read(words: &[u32]) -> Option<Shape> {
     let [nodes, blocks, levels] = *words.first_chunk::<HEAD>()?;
     let lanes = |count: u32| (count as usize).checked_mul(WIDTH);
     let after_levels = HEAD.checked_add(levels as usize)?;
     let after_nodes = after_levels.checked_add(lanes(nodes)?)?;
     let end = after_nodes.checked_add(lanes(blocks)?)?;
-    if !rest.is_empty() || words.len() != end {
+    if words.len() != end {
         return None;
     }
     let mut start = 0;
@@ -104,22 +102,22 @@ mod tests {
         let triangles: Vec<[u32; 3]> = (0..100).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
         for quality in Quality::ALL {
             let tree = Tree::build(&positions, &triangles, quality);
-            let bytes = tree.shape_bytes();
-            let again = Tree::from_shape(&bytes, &positions, &triangles).unwrap();
+            let words = tree.shape();
+            let again = Tree::from_shape(&words, &positions, &triangles).unwrap();
             assert_eq!(validate(&again, &positions, &triangles), Ok(()));
             assert_eq!((again.counts(), again.cost()), (tree.counts(), tree.cost()));
-            assert!(Tree::from_shape(&bytes, &positions, &triangles[1..]).is_none());
-            assert!(Tree::from_shape(&bytes[4..], &positions, &triangles).is_none());
+            assert!(Tree::from_shape(&words, &positions, &triangles[1..]).is_none());
+            assert!(Tree::from_shape(&words[1..], &positions, &triangles).is_none());
             // no byte of it may do harm: what is taken is a sound tree
-            for at in 0..bytes.len() {
-                let mut changed = bytes.clone();
-                changed[at] ^= 0x81;
+            for at in 0..4 * words.len() {
+                let mut changed = words.clone();
+                changed[at / 4] ^= 0x81 << (8 * (at % 4));
                 if let Some(tree) = Tree::from_shape(&changed, &positions, &triangles) {
                     assert_eq!(validate(&tree, &positions, &triangles), Ok(()), "byte {at}");
                 }
             }
         }
         let empty = Tree::build(&[], &[], Quality::Fastest);
-        assert!(Tree::from_shape(&empty.shape_bytes(), &[], &[]).is_some());
+        assert!(Tree::from_shape(&empty.shape(), &[], &[]).is_some());
     }
 }

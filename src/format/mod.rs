@@ -14,7 +14,8 @@ mod triple;
 
 use crate::clock::Stopwatch;
 use crate::math::Bounds;
-use crate::scene::Geometry;
+use crate::scene::{Geometry, PartHash};
+use crate::store::Store;
 use crate::warning::Warnings;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -91,28 +92,89 @@ pub fn load_obj_after(
 ) -> Result<(Loaded, Option<Parsed>), FormatError> {
     let watch = Stopwatch::start();
     let bytes = text::read(path)?;
+    load_text(before, bytes, watch.ms(), None, path, options, textures)
+}
+
+/// [`load_obj`] through a store: the shape in a file of the same bytes is taken from it, where it holds it, and put into
+/// it, where it does not. What comes out does not depend on it. The second value is that of [`load_obj_after`], where
+/// another frame follows.
+pub fn load_obj_stored(
+    store: &Store,
+    is_followed: bool,
+    path: &Path,
+    options: &ReadOptions,
+    textures: &TextureCache,
+) -> Result<(Loaded, Option<Parsed>), FormatError> {
+    let watch = Stopwatch::start();
+    // the text itself is for the next frame, or to be parsed
+    let text = if is_followed { Some(text::read(path)?) } else { None };
+    let digest = text.as_deref().map_or_else(|| text::digest(path), |text| Ok(text::digest_of(text)))?;
     let read_ms = watch.ms();
+    let watch = Stopwatch::start();
+    let key = obj::stored::key(digest, is_followed, options);
+    let Some(stored) = obj::stored::get(store, key, digest.1) else {
+        let bytes = text.map_or_else(|| text::read(path), Ok)?;
+        let store = Some((store, is_followed));
+        return load_text(None, bytes, read_ms + watch.ms(), store, path, options, textures);
+    };
+    let mut warnings = stored.warnings(path);
+    let mut loader = library::Loader::new(path, options);
+    let library = loader.library(&stored.libraries(), stored.used_materials(), textures, &mut warnings)?;
+    let shape = stored.into_shape(&library, path, &mut warnings);
+    Ok(loaded(path, digest.1, text, shape, loader, warnings, read_ms, &watch))
+}
+
+/// Reads an OBJ in memory and all that it refers to; puts it into a store, where one is given, with whether another
+/// frame follows.
+fn load_text(
+    before: Option<&Parsed>,
+    bytes: Vec<u8>,
+    read_ms: f64,
+    store: Option<(&Store, bool)>,
+    path: &Path,
+    options: &ReadOptions,
+    textures: &TextureCache,
+) -> Result<(Loaded, Option<Parsed>), FormatError> {
     let watch = Stopwatch::start();
     let text = Text::new(&bytes, path)?;
     let mut warnings = Warnings::default();
     let lines = obj::Lines::new(&text, path, options.lenient, before, &mut warnings)?;
+    let said = store.map(|_| lines.said(&warnings));
     let mut loader = library::Loader::new(path, options);
     let library = loader.library(lines.libraries(), lines.used_materials(), textures, &mut warnings)?;
     let shape = lines.into_shape(&library, options, &mut warnings);
+    if let (Some((store, is_followed)), Some(said)) = (store, said) {
+        // of these bytes: the file may have changed since it was looked for
+        let key = obj::stored::key(text::digest_of(&bytes), is_followed, options);
+        obj::stored::put(store, key, &said, &shape, is_followed);
+    }
+    Ok(loaded(path, bytes.len() as u64, Some(bytes), shape, loader, warnings, read_ms, &watch))
+}
+
+#[allow(clippy::too_many_arguments, reason = "the two ways' ends")]
+fn loaded(
+    path: &Path,
+    length: u64,
+    text: Option<Vec<u8>>,
+    shape: obj::Shape,
+    loader: library::Loader,
+    warnings: Warnings,
+    read_ms: f64,
+    watch: &Stopwatch,
+) -> (Loaded, Option<Parsed>) {
     let inputs = std::iter::once(path.to_path_buf()).chain(loader.inputs).collect();
-    let bytes_read = bytes.len() as u64 + loader.bytes_read;
-    let (geometry, material_names, parsed) = shape.keep(bytes);
+    let (geometry, material_names, parsed) = shape.keep(text);
     let loaded = Loaded {
         geometry,
         inputs,
         material_names,
-        bytes_read,
+        bytes_read: length + loader.bytes_read,
         read_ms,
         parse_ms: watch.ms(),
         warnings,
         missing: loader.missing,
     };
-    Ok((loaded, parsed))
+    (loaded, parsed)
 }
 
 /// The box of the positions in an OBJ that are finite, as [`load_obj`] gives them; empty where there is none.
@@ -122,13 +184,24 @@ pub fn scan_bounds(path: &Path) -> Result<Bounds, FormatError> {
     Ok(bounds)
 }
 
+/// A name for the content of a file.
+pub fn digest(path: &Path) -> Result<PartHash, FormatError> {
+    text::digest(path).map(|(hash, _)| hash)
+}
+
 /// The libraries that an OBJ names and the maps of all materials, as far as they are there; the buffers and images of a
 /// glTF. The shape is not read, and what cannot be read names nothing: this is for what must not be written over.
 pub fn named_files(path: &Path, options: &ReadOptions) -> Vec<PathBuf> {
     if is_gltf(path) {
         return gltf::named_files(path);
     }
-    let Ok(bytes) = text::read(path) else { return Vec::new() };
-    let Ok(text) = Text::new(&bytes, path) else { return Vec::new() };
-    library::Loader::new(path, options).named_files(&obj::library_statements(&text))
+    let mut libraries: Vec<Vec<u8>> = Vec::new();
+    let read = text::read_pieces(path, |text| {
+        libraries.extend(obj::library_statements(text).into_iter().map(<[u8]>::to_vec));
+    });
+    if read.is_err() {
+        return Vec::new();
+    }
+    let libraries: Vec<&[u8]> = libraries.iter().map(Vec::as_slice).collect();
+    library::Loader::new(path, options).named_files(&libraries)
 }

@@ -2,6 +2,7 @@
 //! for UTF-8.
 
 use super::error::FormatError;
+use crate::scene::{PartHash, PartHasher};
 use memchr::{memchr_iter, memrchr_iter};
 use std::borrow::Cow;
 use std::fs::{self, File};
@@ -38,7 +39,32 @@ pub(super) fn read(path: &Path) -> Result<Vec<u8>, FormatError> {
     Ok(bytes)
 }
 
-/// Bytes read at a time by [`read_pieces`]: what a core's second cache holds.
+/// The hash of a plain file's bytes, as [`digest_of`] gives it; no more is held than a piece.
+pub(super) fn digest(path: &Path) -> Result<(PartHash, u64), FormatError> {
+    let (mut file, _) = open(path)?;
+    let mut hasher = PartHasher::new("file");
+    let mut buffer = vec![0; PIECE_BYTES];
+    let mut length = 0;
+    loop {
+        let read = fill(&mut file, &mut buffer).map_err(|source| unreadable(path, source))?;
+        if read > 0 {
+            hasher.bytes(&buffer[..read]);
+        }
+        length += read as u64;
+        if read < buffer.len() {
+            return within_limit(path, length).map(|()| (hasher.finish(), length));
+        }
+    }
+}
+
+/// The hash of bytes, and how many they are.
+pub(super) fn digest_of(bytes: &[u8]) -> (PartHash, u64) {
+    let mut hasher = PartHasher::new("file");
+    bytes.chunks(PIECE_BYTES).for_each(|piece| hasher.bytes(piece));
+    (hasher.finish(), bytes.len() as u64)
+}
+
+/// Bytes read at a time by [`read_pieces`] and [`digest`]: what a core's second cache holds.
 const PIECE_BYTES: usize = 256 << 10;
 
 /// Reads a plain file in pieces of whole lines, continued ones not parted, and gives each to `take`. No more is held
@@ -334,6 +360,7 @@ mod tests {
             let whole = Text::new(content.as_bytes(), &path).unwrap();
             assert!(joined == whole.joined.as_ref(), "{} bytes", content.len());
             assert_eq!(count, pieces, "{} bytes", content.len());
+            assert_eq!(digest(&path).unwrap(), digest_of(content.as_bytes()));
         }
     }
 

@@ -2,6 +2,7 @@
 //! encoding n overlap; memory is bounded by the queues' lengths. An error is a value that travels with its frame.
 
 mod animation;
+mod boxes;
 mod check;
 mod costs;
 pub mod event;

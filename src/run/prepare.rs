@@ -2,14 +2,14 @@
 
 use super::RunOptions;
 use super::animation::Views;
+use super::boxes;
 use super::read::read_options;
-use super::source::Sources;
-use crate::format::{self, FormatError, Gltf};
-use crate::job::{Background, CameraChoice, FrameFile, Job, Layer, LightChoice, Picture, Sequence, auto};
+use super::source::{Place, Sources};
+use crate::format;
+use crate::job::{Background, CameraChoice, Job, LightChoice, Picture, Sequence, auto};
 use crate::math::{Bounds, DVec3};
 use crate::scene::{self, Camera, Light, Object, Part, Shot, Texture};
 use crate::warning::Warnings;
-use rayon::prelude::*;
 use std::collections::HashMap;
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -46,7 +46,8 @@ pub(super) fn prepare(job: &Job, options: &RunOptions) -> Prepared {
             continue;
         }
         if auto_camera {
-            let bounds = bounds(sequence, &prepared.sources, &mut prepared.warnings);
+            let (animations, store) = (&prepared.sources.animations, options.store_of_run());
+            let bounds = boxes::bounds(sequence, animations, store.as_deref(), &mut prepared.warnings);
             prepared.sequences[i].bounds = Some(bounds);
         }
         if auto_light {
@@ -106,49 +107,6 @@ fn backgrounds(job: &Job) -> HashMap<PathBuf, Result<Part<Texture>, String>> {
     read
 }
 
-/// The box of a sequence's layers over the frames that are looked at; files are scanned on all cores. What cannot be
-/// read is left out and said.
-fn bounds(sequence: &Sequence, sources: &Sources, warnings: &mut Warnings) -> Bounds {
-    // opening decodes textures on rayon's pool, which must not be done from within it
-    let animations: Vec<_> = sequence.layers.iter().map(|l| animation(sequence, l, sources)).collect();
-    let files: Vec<_> = sequence
-        .layers
-        .iter()
-        .zip(&animations)
-        .flat_map(|(l, a)| auto::scanned(l).map(move |i| (l, a, &l.files[i])))
-        .collect();
-    let boxes: Vec<_> = files
-        .par_iter()
-        .map(|(layer, animation, file)| (*layer, file, file_bounds(file, animation.as_ref())))
-        .collect();
-    let mut all = Bounds::EMPTY;
-    for (layer, file, bounds) in boxes {
-        match bounds {
-            Ok(b) => all.merge(&auto::placed(layer, &b)),
-            Err(error) => {
-                warnings.add(Some(&file.path), None, format!("left out of the auto camera's box: {error}"));
-            }
-        }
-    }
-    all
-}
-
-/// The glTF file of a layer, where it is one and can be opened.
-fn animation(sequence: &Sequence, layer: &Layer, sources: &Sources) -> Option<Arc<Gltf>> {
-    let file = layer.files.first().filter(|file| file.moment.is_some())?;
-    let read = read_options(&sequence.first, layer.materials.as_deref(), false);
-    sources.animations.open(&file.path, &read, false).ok().map(|(gltf, _)| gltf)
-}
-
-fn file_bounds(file: &FrameFile, animation: Option<&Arc<Gltf>>) -> Result<Bounds, FormatError> {
-    match (&file.moment, animation) {
-        (None, _) => format::scan_bounds(&file.path),
-        (Some(moment), Some(gltf)) => gltf.bounds(moment.time_s, &moment.clip),
-        // why it cannot be opened is told when its frames fail
-        (Some(_), None) => Ok(Bounds::EMPTY),
-    }
-}
-
 /// What stands in a sequence's first picture; layers that cannot be read are left out (their frames fail when their
 /// turn comes).
 fn first_objects(sequence: &Sequence, options: &RunOptions, sources: &Sources) -> (Vec<Object>, Views) {
@@ -164,7 +122,10 @@ fn first_objects(sequence: &Sequence, options: &RunOptions, sources: &Sources) -
                 views.cameras.extend(shown.views.cameras);
                 views.lights.extend(shown.views.lights);
             }
-        } else if let Ok(loaded) = sources.ahead(&file.path, &read) {
+            continue;
+        }
+        let place = if layer.files.len() == 1 { Place::Only } else { Place::First };
+        if let Ok(loaded) = sources.ahead(&file.path, &read, place) {
             objects.push(Object { geometry: Arc::clone(&loaded.geometry), transform: source.transform });
         }
     }

@@ -4,12 +4,12 @@ use super::animation::{self, Views};
 use super::event::{ByteCounts, FrameReport, StageTimes, Status, UpdateReport};
 use super::memory::{InFlight, expected_bytes, needed_bytes, refusal};
 use super::prepare::Prepared;
-use super::source::Sources;
+use super::source::{Place, Sources};
 use super::{Note, RunOptions, panic_text};
 use crate::device::Stop;
 use crate::diff::Change;
 use crate::format::{FormatError, Loaded, ReadOptions};
-use crate::job::{Job, Picture, Settings};
+use crate::job::{Job, Picture, Settings, Source};
 use crate::output::{Bits, Encoding, Format, Records};
 use crate::scene::{Frame, Object, PartHash, PartHasher, Shot};
 use crate::warning::Warnings;
@@ -272,10 +272,9 @@ fn load_frame(
         read_ms: 0.0,
         parse_ms: 0.0,
     };
-    for (place, source) in picture.sources.iter().enumerate() {
+    for (at, source) in picture.sources.iter().enumerate() {
         let Some(file) = source.file else { continue };
         let layer = &sequence.layers[source.layer];
-        let still = layer.files.len() == 1 && job.pictures.len() > 1;
         let options = read_options(picture, layer.materials.as_deref(), lenient);
         let path = &layer.files[file].path;
         if let Some(moment) = &layer.files[file].moment {
@@ -290,11 +289,11 @@ fn load_frame(
             all.parse_ms += shown.parse_ms;
             all.views.cameras.extend(shown.views.cameras);
             all.views.lights.extend(shown.views.lights);
-            all.sources.extend(shown.objects.iter().map(|_| place));
+            all.sources.extend(shown.objects.iter().map(|_| at));
             all.frame.objects.extend(shown.objects);
             continue;
         }
-        let (loaded, first) = sources.load(path, &options, still)?;
+        let (loaded, first) = sources.load(path, &options, place(job, picture, source))?;
         if first {
             all.bytes_read += loaded.bytes_read;
             all.read_ms += loaded.read_ms;
@@ -305,12 +304,24 @@ fn load_frame(
         if strict && let Some(missing) = loaded.missing.first() {
             return Err(LoadError::Bad(format!("{missing}; the frame is not rendered (--strict)")));
         }
-        all.sources.push(place);
+        all.sources.push(at);
         all.frame
             .objects
             .push(Object { geometry: Arc::clone(&loaded.geometry), transform: source.transform });
     }
     Ok(all)
+}
+
+/// Where a source's file stands among those of its layer that the job asks for.
+fn place(job: &Job, picture: &Picture, source: &Source) -> Place {
+    let first = job.pictures.iter().find(|p| p.sequence == picture.sequence).unwrap_or(picture);
+    if job.sequences[picture.sequence].layers[source.layer].files.len() == 1 {
+        Place::Only
+    } else if first.sources.iter().any(|s| (s.layer, s.file) == (source.layer, source.file)) {
+        Place::First
+    } else {
+        Place::Later
+    }
 }
 
 /// Reads the frame of a picture, without the run around it.

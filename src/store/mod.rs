@@ -7,8 +7,10 @@
 
 mod entry;
 mod folder;
+mod payload;
 
 pub use folder::{Stat, is_own_checkout};
+pub use payload::Payload;
 
 use entry::{Entry, Kind};
 use std::fmt;
@@ -51,11 +53,12 @@ impl Store {
         }
     }
 
-    /// What was put under a key; None where nothing was, or where it is damaged: then it is given up.
-    pub fn get(&self, kind: &str, key: Key) -> Option<Vec<u8>> {
+    /// What `take` makes of what was put under a key; None where nothing was, or where it is damaged: then it is given
+    /// up. `take` sees it before that is known, so it must bear with anything.
+    pub fn get<T>(&self, kind: &str, key: Key, take: impl FnOnce(&mut Payload) -> Option<T>) -> Option<T> {
         let path = self.path(kind, key);
-        match (Entry { kind: Kind::new(kind), key }).read(&path) {
-            Ok(payload) => payload,
+        match (Entry { kind: Kind::new(kind), key }).read(&path, take) {
+            Ok(taken) => taken,
             Err(why) => {
                 self.note(format!("{}: damaged ({why}); it is made anew", path.display()));
                 folder::remove(&path);

@@ -7,19 +7,45 @@ fn store(limit_bytes: u64) -> (tempfile::TempDir, Store) {
     (t, store)
 }
 
+fn got(store: &Store, kind: &str, key: Key) -> Option<Vec<u8>> {
+    store.get(kind, key, Payload::rest)
+}
+
 #[test]
 fn what_was_put_comes_back() {
     let (_t, store) = store(1 << 20);
-    assert_eq!((store.get("a", Key(1)), store.stat()), (None, Stat::default()));
+    assert_eq!((got(&store, "a", Key(1)), store.stat()), (None, Stat::default()));
     store.put("a", Key(1), &[b"one", b"", b" two"]);
-    assert_eq!(store.get("a", Key(1)).unwrap(), b"one two");
+    assert_eq!(got(&store, "a", Key(1)).unwrap(), b"one two");
     // another kind, another key
-    assert_eq!((store.get("b", Key(1)), store.get("a", Key(2))), (None, None));
+    assert_eq!((got(&store, "b", Key(1)), got(&store, "a", Key(2))), (None, None));
     store.put("a", Key(1), &[b"three"]);
-    assert_eq!(store.get("a", Key(1)).unwrap(), b"three");
+    assert_eq!(got(&store, "a", Key(1)).unwrap(), b"three");
     // a head of 56 bytes
     assert_eq!(store.stat(), Stat { entries: 1, bytes: 56 + 5 });
     assert!(store.take_notes().is_empty());
+}
+
+#[test]
+fn lists_come_back_in_pieces() {
+    let (_t, store) = store(1 << 22);
+    let long: Vec<u32> = (0..100_000).collect();
+    store.put("a", Key(1), &[bytemuck::cast_slice(&long), b"end"]);
+    let taken = store.get("a", Key(1), |payload| {
+        assert_eq!(payload.values::<u32>(usize::MAX), None);
+        assert_eq!(payload.values::<u32>(100_001), None);
+        assert_eq!(payload.rest::<u32>(), None, "3 bytes too many");
+        Some((payload.values::<[u32; 2]>(50_000)?, payload.left()))
+    });
+    let (values, left) = taken.unwrap();
+    assert!(values.as_flattened() == long && left == 3);
+    // what is left or refused is looked at all the same
+    let path = store.path("a", Key(1));
+    let mut bytes = fs::read(&path).unwrap();
+    *bytes.last_mut().unwrap() ^= 1;
+    fs::write(path, bytes).unwrap();
+    assert_eq!(store.get("a", Key(1), |_| Some(())), None);
+    assert_eq!(store.take_notes().len(), 1);
 }
 
 /// What befalls an entry; the other one is whole.
@@ -44,11 +70,11 @@ fn damage_is_told_and_given_up() {
         store.put("a", Key(1), &[content]);
         store.put("a", Key(2), &[content]);
         damage(&store.path("a", Key(1)), &store.path("a", Key(2)));
-        assert_eq!(store.get("a", Key(1)), None);
+        assert_eq!(got(&store, "a", Key(1)), None);
         let notes = store.take_notes();
         assert!(notes.len() == 1 && notes[0].contains("damaged"), "{notes:?}");
         assert!(!store.path("a", Key(1)).exists());
-        assert_eq!(store.get("a", Key(2)).unwrap(), content);
+        assert_eq!(got(&store, "a", Key(2)).unwrap(), content);
     }
     // every bit of an entry counts
     store.put("a", Key(1), &[b"xy"]);
@@ -58,7 +84,7 @@ fn damage_is_told_and_given_up() {
         let mut bytes = whole.clone();
         bytes[bit / 8] ^= 1 << (bit % 8);
         fs::write(&path, bytes).unwrap();
-        assert_eq!(store.get("a", Key(1)), None, "bit {bit}");
+        assert_eq!(got(&store, "a", Key(1)), None, "bit {bit}");
     }
 }
 
@@ -71,9 +97,9 @@ fn the_longest_unused_goes_first() {
         fs::File::open(store.path("a", Key(key))).unwrap().set_modified(time).unwrap();
     }
     // the first is used again
-    assert!(store.get("a", Key(1)).is_some());
+    assert!(got(&store, "a", Key(1)).is_some());
     assert_eq!(store.collect_garbage(), Stat { entries: 1, bytes: 66 });
-    assert_eq!([1, 2, 3].map(|key| store.get("a", Key(key)).is_some()), [true, false, true]);
+    assert_eq!([1, 2, 3].map(|key| got(&store, "a", Key(key)).is_some()), [true, false, true]);
     assert_eq!(store.clear().entries, 2);
     assert_eq!(store.stat().entries, 0);
 }
@@ -86,7 +112,7 @@ fn a_store_that_cannot_be_written_is_told_of_once() {
     let store = Store::new(&file, 1 << 20);
     store.put("a", Key(1), &[b"one"]);
     store.put("a", Key(2), &[b"two"]);
-    assert_eq!(store.get("a", Key(1)), None);
+    assert_eq!(got(&store, "a", Key(1)), None);
     let notes = store.take_notes();
     assert!(notes.len() == 1 && notes[0].contains("--no-cache"), "{notes:?}");
 }

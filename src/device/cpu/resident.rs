@@ -5,7 +5,7 @@ use crate::clock::Stopwatch;
 use crate::device::{DeviceError, DeviceInfo, UpdateCost};
 use crate::plan::{Action, Residency, Step, TreeState, UpdatePlan, tree_name};
 use crate::scene::{Frame, Geometry, PartHash, SharedPart};
-use crate::store::{Key, Store};
+use crate::store::{Key, Payload, Store};
 use rayon::ThreadPool;
 use std::collections::HashMap;
 use std::sync::Arc;
@@ -154,12 +154,12 @@ fn stored_or_built(name: PartHash, geometry: &Geometry, store: Option<&Store>) -
     let (positions, triangles) = (&geometry.positions.0, &geometry.triangles.0);
     let build = || Tree::build(positions, triangles, Quality::default());
     let Some(store) = store.filter(|_| triangles.len() >= LEAST_STORED) else { return build() };
-    let stored = store.get(STORED, Key(name.0));
-    if let Some(tree) = stored.and_then(|bytes| Tree::from_shape(&bytes, positions, triangles)) {
+    let stored = store.get(STORED, Key(name.0), Payload::rest);
+    if let Some(tree) = stored.and_then(|words| Tree::from_shape(&words, positions, triangles)) {
         return tree;
     }
     let tree = build();
-    store.put(STORED, Key(name.0), &[&tree.shape_bytes()]);
+    store.put(STORED, Key(name.0), &[bytemuck::cast_slice(&tree.shape())]);
     tree
 }
 

@@ -155,7 +155,7 @@ fn shared<T: Content + PartialEq>(before: Option<&Part<T>>, content: T) -> Part<
     before.filter(|before| before.hash() == part.hash()).cloned().unwrap_or(part)
 }
 
-fn material_runs(runs: Vec<(u32, u32)>, counts: &[u32]) -> MaterialRuns {
+pub(super) fn material_runs(runs: Vec<(u32, u32)>, counts: &[u32]) -> MaterialRuns {
     let mut starts = TriangleStarts::new(counts);
     MaterialRuns(runs.into_iter().map(|(face, slot)| [starts.at(face), slot]).collect())
 }
@@ -280,7 +280,8 @@ impl<'a> TriangleStarts<'a> {
     }
 }
 
-fn meshes(objects: &[u32], counts: &[u32]) -> Vec<Mesh> {
+/// The meshes between those faces.
+pub(super) fn meshes(objects: &[u32], counts: &[u32]) -> Vec<Mesh> {
     let borders = if objects.len() > MAX_MESHES { &[] } else { objects };
     let firsts = std::iter::once(0).chain(borders.iter().copied());
     let ends = borders.iter().copied().chain([counts.len() as u32]);

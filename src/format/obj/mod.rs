@@ -9,6 +9,7 @@ mod check;
 mod face;
 mod mesh;
 mod scan;
+pub(super) mod stored;
 #[cfg(test)]
 mod tests;
 mod triangulate;
@@ -20,7 +21,7 @@ use super::text::{Tally, Text, first_word, is_line_end, line_end, shown, trimmed
 use crate::math::{Bounds, DVec3};
 use crate::scene::Geometry;
 use crate::warning::Warnings;
-use mesh::Known;
+use mesh::{Known, UsedMaterials};
 use scan::Scan;
 use std::path::Path;
 use std::sync::Arc;
@@ -43,6 +44,8 @@ pub(super) struct Lines<'a> {
     path: &'a Path,
     /// What has the same faces; their lists in `scan` are then empty but for the normals.
     before: Option<&'a Parsed>,
+    /// Whether no index names what cannot be used.
+    all_usable: bool,
 }
 
 /// What is read of an OBJ, and what makes the next quicker to read, where there is such a thing.
@@ -53,9 +56,13 @@ pub(super) struct Shape {
 
 impl Shape {
     /// The shape, and what to keep for the next frame.
-    pub(super) fn keep(self, bytes: Vec<u8>) -> (Arc<Geometry>, Vec<Vec<u8>>, Option<Parsed>) {
+    pub(super) fn keep(self, text: Option<Vec<u8>>) -> (Arc<Geometry>, Vec<Vec<u8>>, Option<Parsed>) {
         let geometry = Arc::new(self.parsed.geometry);
-        let parsed = self.known.map(|known| Parsed { bytes, geometry: Arc::clone(&geometry), known });
+        let parsed = self.known.zip(text).map(|(known, bytes)| Parsed {
+            bytes,
+            geometry: Arc::clone(&geometry),
+            known,
+        });
         (geometry, self.parsed.material_names, parsed)
     }
 }
@@ -110,14 +117,18 @@ impl<'a> Lines<'a> {
         before: Option<&'a Parsed>,
         warnings: &mut Warnings,
     ) -> Result<Self, FormatError> {
-        if let Some(parsed) = before.filter(|_| text.is_plain())
-            && let Some(scan) = again::scan_again(&text.joined, parsed)
-        {
-            return Ok(Self { scan, text, path, before });
-        }
-        let mut scan = scan::scan(&text.joined);
-        check::check_faces(&mut scan, text, path, lenient, warnings)?;
-        Ok(Self { scan, text, path, before: None })
+        let scan_again = |parsed| again::scan_again(&text.joined, parsed).map(|scan| (scan, parsed));
+        let again = before.filter(|_| text.is_plain()).and_then(scan_again);
+        let mut lines = if let Some((scan, before)) = again {
+            Self { scan, text, path, before: Some(before), all_usable: true }
+        } else {
+            let mut scan = scan::scan(&text.joined);
+            check::check_faces(&mut scan, text, path, lenient, warnings)?;
+            Self { scan, text, path, before: None, all_usable: false }
+        };
+        lines.warn_of_oddities(warnings);
+        lines.all_usable = lines.all_usable || lines.settle_attributes(warnings);
+        Ok(lines)
     }
 
     /// What stands behind each `mtllib`.
@@ -132,21 +143,14 @@ impl<'a> Lines<'a> {
 
     /// Makes the shape.
     pub(super) fn into_shape(
-        mut self,
+        self,
         library: &Library,
         options: &ReadOptions,
         warnings: &mut Warnings,
     ) -> Shape {
-        self.warn_of_oddities(warnings);
-        let all_usable = self.before.is_some() || self.settle_attributes(warnings);
-        let can_be_known = all_usable && self.can_be_known();
+        let can_be_known = self.all_usable && self.can_be_known();
         let used = mesh::materials(&self.scan, library);
-        if let Some(name) = used.unknown.first()
-            && !library.incomplete
-        {
-            let text = format!("material `{}` is in no library; its faces get the default", shown(name));
-            warnings.add_times(Some(self.path), None, text, used.unknown.len() as u64);
-        }
+        warn_of_unknown(&used, library, self.path, warnings);
         let angle = options.smooth_angle_deg;
         let (geometry, known) = match self.before {
             None => mesh::geometry(self.scan, used.runs, used.materials, angle),
@@ -154,10 +158,7 @@ impl<'a> Lines<'a> {
                 mesh::geometry_again(self.scan, used.runs, used.materials, angle, geometry, known)
             }
         };
-        if is_invisible(&geometry) {
-            let text = "every face is wholly transparent (d 0); nothing will be seen of them";
-            warnings.add(Some(self.path), None, text);
-        }
+        warn_if_invisible(&geometry, self.path, warnings);
         let parsed = ParsedObj { geometry, material_names: used.names };
         Shape { parsed, known: can_be_known.then_some(known) }
     }
@@ -212,6 +213,22 @@ impl<'a> Lines<'a> {
             warnings.add_times(Some(self.path), None, text, count);
         }
         refused.iter().all(|&(_, count)| count == 0)
+    }
+}
+
+fn warn_of_unknown(used: &UsedMaterials, library: &Library, path: &Path, warnings: &mut Warnings) {
+    if let Some(name) = used.unknown.first()
+        && !library.incomplete
+    {
+        let text = format!("material `{}` is in no library; its faces get the default", shown(name));
+        warnings.add_times(Some(path), None, text, used.unknown.len() as u64);
+    }
+}
+
+fn warn_if_invisible(geometry: &Geometry, path: &Path, warnings: &mut Warnings) {
+    if is_invisible(geometry) {
+        let text = "every face is wholly transparent (d 0); nothing will be seen of them";
+        warnings.add(Some(path), None, text);
     }
 }
 

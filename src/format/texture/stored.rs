@@ -2,15 +2,10 @@
 
 use super::TextureUse;
 use crate::scene::{PartHasher, TexelSpace, Texels, Texture};
-use crate::store::{Key, Store};
+use crate::store::{Key, Payload, Store};
 
 /// Another name for each form in which textures are kept, or in which they are decoded.
 const KIND: &str = "texture-1";
-const HEAD_BYTES: usize = 12;
-
-/// Bytes of a texel.
-const U8_BYTES: usize = 4;
-const F32_BYTES: usize = 16;
 
 /// The name of what becomes of a picture file.
 pub(super) fn key(file: &[u8], texture_use: TextureUse) -> Key {
@@ -35,29 +30,26 @@ pub(super) fn put(store: &Store, key: Key, texture: &Texture) {
 
 /// The texture that was put; None where the store has none, or one of another form.
 pub(super) fn get(store: &Store, key: Key) -> Option<Texture> {
-    let bytes = store.get(KIND, key)?;
-    let (head, texels) = bytes.split_at_checked(HEAD_BYTES)?;
-    let [width, height, flags] =
-        [0, 4, 8].map(|at| u32::from_le_bytes([head[at], head[at + 1], head[at + 2], head[at + 3]]));
+    store.get(KIND, key, taken)
+}
+
+fn taken(payload: &mut Payload) -> Option<Texture> {
+    let [width, height, flags] = payload.values::<[u32; 3]>(1)?[0].map(u32::from_le);
     if width == 0 || height == 0 || flags > 7 {
         return None;
     }
-    let is_float = flags & 4 != 0;
-    let texture = Texture {
+    let mut texture = Texture {
         size: [width, height],
         space: if flags & 1 != 0 { TexelSpace::Srgb } else { TexelSpace::Linear },
         alpha_varies: flags & 2 != 0,
-        texels: if is_float {
-            Texels::F32(bytemuck::pod_collect_to_vec(texels.get(..texels.len() / F32_BYTES * F32_BYTES)?))
-        } else {
-            Texels::U8(bytemuck::pod_collect_to_vec(texels.get(..texels.len() / U8_BYTES * U8_BYTES)?))
-        },
+        texels: Texels::U8(Vec::new()),
     };
     let count: usize = (0..texture.levels())
         .map(|level| texture.level_size(level).map(|s| s as usize))
         .try_fold(0_usize, |sum, [w, h]| sum.checked_add(w.checked_mul(h)?))?;
-    let expected = count.checked_mul(if is_float { F32_BYTES } else { U8_BYTES })?;
-    (texels.len() == expected).then_some(texture)
+    texture.texels =
+        if flags & 4 != 0 { Texels::F32(payload.values(count)?) } else { Texels::U8(payload.values(count)?) };
+    (payload.left() == 0).then_some(texture)
 }
 
 #[cfg(test)]

@@ -38,7 +38,7 @@ fn read(
         let lines = Lines::new(&text, path, options.lenient, before, &mut warnings)?;
         let again = lines.before.is_some();
         let shape = lines.into_shape(library, options, &mut warnings);
-        let (geometry, names, parsed) = shape.keep(bytes.to_vec());
+        let (geometry, names, parsed) = shape.keep(Some(bytes.to_vec()));
         Ok(Outcome { geometry, names, parsed, again })
     })();
     (outcome, warnings)
