@@ -25,12 +25,14 @@ impl Tree {
             cost: 0.0,
             rows: Vec::new(),
             half_areas: Vec::new(),
+            moved: Vec::new(),
         };
         tree.refit(positions, triangles);
         tree
     }
 
-    /// Fits the tree as it stands to other positions, in the current rayon pool. Triangles that are made of other
+    /// Fits the tree as it stands to other positions, in the current rayon pool. Leaves whose corners stand still are left
+    /// alone, and nodes above nothing but such leaves; the tree is the one that a refit of all of it gives. Triangles that are made of other
     /// corners are taken as they are now; their number must be that which the tree was built over.
     pub fn refit(&mut self, positions: &[[f32; 3]], triangles: &[[u32; 3]]) {
         self.refit_in(Width::detect(), positions, triangles);
@@ -45,23 +47,39 @@ impl Tree {
 
     fn refit_here(&mut self, width: Width, mesh: &Mesh) {
         let nodes = self.nodes.len();
+        let all = self.moved.is_empty();
+        self.moved.resize(nodes + self.blocks.len(), true);
         self.rows.resize(nodes + self.blocks.len(), Row::EMPTY);
         self.half_areas.resize(nodes, 0.0);
         self.vertex_box = self
             .blocks
             .par_chunks_mut(GRAIN)
             .zip(self.rows[nodes..].par_chunks_mut(GRAIN))
-            .map(|(blocks, rows)| width.compute(FitBlocks { blocks, rows, mesh }))
+            .zip(self.moved[nodes..].par_chunks_mut(GRAIN))
+            .map(|((blocks, rows), moved)| width.compute(FitBlocks { blocks, rows, moved, all, mesh }))
             .reduce(|| Aabb::EMPTY, |a, b| a.union(&b));
         for level in self.levels.iter().rev() {
             let (rows, below) = self.rows.split_at_mut(level.end);
-            let first_leaf = nodes - level.end;
+            let (moved, moved_below) = self.moved.split_at_mut(level.end);
+            let (first, first_leaf) = (level.end, nodes - level.end);
             self.nodes[level.clone()]
                 .par_chunks_mut(GRAIN)
                 .zip(rows[level.clone()].par_chunks_mut(GRAIN))
                 .zip(self.half_areas[level.clone()].par_chunks_mut(GRAIN))
-                .for_each(|((nodes, rows), half_areas)| {
-                    width.compute(FitNodes { nodes, rows, half_areas, below, first: level.end, first_leaf });
+                .zip(moved[level.clone()].par_chunks_mut(GRAIN))
+                .for_each(|(((nodes, rows), half_areas), moved)| {
+                    let level = FitNodes {
+                        nodes,
+                        rows,
+                        half_areas,
+                        moved,
+                        below,
+                        moved_below,
+                        first,
+                        first_leaf,
+                        all,
+                    };
+                    width.compute(level);
                 });
         }
         self.bounds = self.nodes.first().map_or(Aabb::EMPTY, Node::bounds);
@@ -144,6 +162,28 @@ mod tests {
                 }
             }
         }
+    }
+
+    #[test]
+    fn what_stands_still_is_left_as_a_whole_refit_leaves_it() {
+        let (positions, mut triangles) = mesh(0);
+        let mut tree = Tree::build(&positions, &triangles, Quality::Fastest);
+        let mut moved = positions.clone();
+        for range in [4_000..4_100, 0..200, 8_999..9_000, 0..9_000, 5..5] {
+            moved[range.clone()].copy_from_slice(&mesh(6).0[range]);
+            triangles[4_321].swap(0, 1);
+            let mut whole = tree.clone();
+            whole.moved.clear();
+            for tree in [&mut tree, &mut whole] {
+                tree.refit(&moved, &triangles);
+                assert_eq!(validate(tree, &moved, &triangles), Ok(()));
+            }
+            assert!(bits(&tree) == bits(&whole));
+            assert_eq!(tree.vertex_box(), whole.vertex_box());
+        }
+        tree.refit(&moved, &triangles);
+        let still = tree.moved.iter().filter(|moved| !**moved).count();
+        assert!(still > tree.moved.len() / 2, "{still} of {}", tree.moved.len());
     }
 
     #[test]

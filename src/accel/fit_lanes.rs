@@ -52,10 +52,15 @@ impl<'a> Mesh<'a> {
     }
 }
 
-/// Takes the corners of some blocks, and gives the box of all corners; their own boxes go to rows.
+/// Takes the corners of some blocks, and gives the box of all corners; their own boxes go to rows. A block whose corners
+/// are those that it has is left alone with its row.
 pub(crate) struct FitBlocks<'a> {
     pub(crate) blocks: &'a mut [Block],
     pub(crate) rows: &'a mut [Row],
+    /// Whether a block is not left alone.
+    pub(crate) moved: &'a mut [bool],
+    /// Whether none is.
+    pub(crate) all: bool,
     pub(crate) mesh: &'a Mesh<'a>,
 }
 
@@ -66,8 +71,8 @@ impl InLanes for FitBlocks<'_> {
     fn compute<L: Lanes8>(self) -> Aabb {
         let mut least = [L::splat(f32::INFINITY); 3];
         let mut greatest = [L::splat(f32::NEG_INFINITY); 3];
-        for (block, row) in self.blocks.iter_mut().zip(self.rows) {
-            let [min, max] = fit_block::<L>(block, row, self.mesh);
+        for ((block, row), moved) in self.blocks.iter_mut().zip(self.rows).zip(self.moved) {
+            let [min, max] = fit_block::<L>(block, row, moved, self.all, self.mesh);
             // the second is given where the first is NaN
             least = per_axis(|k| min[k].min(least[k]));
             greatest = per_axis(|k| max[k].max(greatest[k]));
@@ -87,7 +92,13 @@ impl InLanes for FitBlocks<'_> {
 /// Takes a block's corners; what has no area becomes NaN, which no test hits. Gives the least and greatest corners of
 /// each triangle.
 #[inline(always)]
-fn fit_block<L: Lanes8>(block: &mut Block, row: &mut Row, mesh: &Mesh) -> [[L; 3]; 2] {
+fn fit_block<L: Lanes8>(
+    block: &mut Block,
+    row: &mut Row,
+    moved: &mut bool,
+    all: bool,
+    mesh: &Mesh,
+) -> [[L; 3]; 2] {
     // lanes without a triangle take the first one's corners and lose them again
     let first = block.triangles[0];
     let numbers = block.triangles;
@@ -102,14 +113,16 @@ fn fit_block<L: Lanes8>(block: &mut Block, row: &mut Row, mesh: &Mesh) -> [[L; 3
     }
     let mut nothing = per_lane(|i| if numbers[i] == NO_TRIANGLE { f32::NAN } else { -0.0 });
     let present = clear(&mut corners, &nothing);
+    *moved = all || !holds(block, &corners);
+    if !*moved {
+        return sides(&corners);
+    }
     let doubtful = present & !surely_have_area(&corners);
     if doubtful != 0 {
         clear_without_area(doubtful, &per_axis(|k| stored(corners[k])), &mut nothing);
         clear(&mut corners, &nothing);
     }
-    let [a, b, c] = &corners;
-    let least = per_axis(|k| a[k].min(b[k].min(c[k])));
-    let greatest = per_axis(|k| a[k].max(b[k].max(c[k])));
+    let [least, greatest] = sides(&corners);
     let margin = own_margin(per_axis(|k| greatest[k].sub(least[k])));
     // the next float is monotonic: the greatest's is the greatest
     let empty = L::splat(f32::NEG_INFINITY);
@@ -118,6 +131,19 @@ fn fit_block<L: Lanes8>(block: &mut Block, row: &mut Row, mesh: &Mesh) -> [[L; 3
     row.0 = L::greatest_of_each([lx, ly, lz, lz, gx, gy, gz, gz]).next_up().store();
     block.corners = per_axis(|k| stored(corners[k]));
     [least, greatest]
+}
+
+/// The least and greatest corners of each triangle.
+#[inline(always)]
+fn sides<L: Lanes8>([a, b, c]: &[[L; 3]; 3]) -> [[L; 3]; 2] {
+    [per_axis(|k| a[k].min(b[k].min(c[k]))), per_axis(|k| a[k].max(b[k].max(c[k])))]
+}
+
+/// Whether a block has these corners, bit for bit.
+#[inline(always)]
+fn holds<L: Lanes8>(block: &Block, corners: &[[L; 3]; 3]) -> bool {
+    let held = block.corners.as_flattened().iter().zip(corners.as_flattened());
+    held.fold(L::splat(0.0), |differ, (held, x)| differ.or_differing(L::load(held), *x)).is_zero()
 }
 
 /// Makes NaN of lanes where `nothing` is; -0 there leaves them as they are. Gives the others.
@@ -159,6 +185,12 @@ pub(crate) struct FitNodes<'a> {
     pub(crate) first: usize,
     /// The place of the first leaf among them.
     pub(crate) first_leaf: usize,
+    /// Whether a node is not left alone, as those are that have no moved child.
+    pub(crate) moved: &'a mut [bool],
+    /// Which of those below moved.
+    pub(crate) moved_below: &'a [bool],
+    /// Whether none is left alone.
+    pub(crate) all: bool,
 }
 
 impl InLanes for FitNodes<'_> {
@@ -166,15 +198,19 @@ impl InLanes for FitNodes<'_> {
 
     #[inline(always)]
     fn compute<L: Lanes8>(self) {
-        let Self { nodes, rows, half_areas, below, first, first_leaf } = self;
-        for ((node, row), half_area) in nodes.iter_mut().zip(rows).zip(half_areas) {
-            let children = per_lane(|i| {
+        let Self { nodes, rows, half_areas, below, first, first_leaf, moved, moved_below, all } = self;
+        for (((node, row), half_area), moved) in nodes.iter_mut().zip(rows).zip(half_areas).zip(moved) {
+            // what is not there has a place beyond all
+            let places = per_lane(|i| {
                 let child = node.children[i];
                 let leaf = (child & !LEAF) as usize + first_leaf;
-                let place = if child & LEAF == 0 { (child as usize).wrapping_sub(first) } else { leaf };
-                // what is not there has a place beyond all
-                below.get(place).unwrap_or(&Row::EMPTY)
+                if child & LEAF == 0 { (child as usize).wrapping_sub(first) } else { leaf }
             });
+            *moved = all || places.iter().fold(false, |any, &i| any | moved_below.get(i).is_some_and(|m| *m));
+            if !*moved {
+                continue;
+            }
+            let children = per_lane(|i| below.get(places[i]).unwrap_or(&Row::EMPTY));
             let [a, b, c, d, e, f, g, h] = per_lane(|i| L::load(&children[i].0));
             row.0 = a.max(b).max(c.max(d)).max(e.max(f).max(g.max(h))).store();
             let less = L::transpose(per_lane(|i| children[i].halves()[0]));

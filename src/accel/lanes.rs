@@ -42,8 +42,10 @@ pub(crate) trait Lanes8: Lanes {
     fn load(from: &[f32; 8]) -> Self;
     /// To memory.
     fn store(self) -> [f32; 8];
-    /// Whether all lanes hold the same bits.
-    fn same_bits(self, other: Self) -> bool;
+    /// These bits, and those that differ in two others.
+    fn or_differing(self, a: Self, b: Self) -> Self;
+    /// Whether no bit is set.
+    fn is_zero(self) -> bool;
     /// The next greater float; what is not finite stays. Like `f32::next_up`, but without branches.
     fn next_up(self) -> Self;
     /// The first three floats of eight rows side by side.
@@ -202,8 +204,13 @@ impl Lanes8 for Portable {
         self.0
     }
     #[inline(always)]
-    fn same_bits(self, other: Self) -> bool {
-        self.0.iter().zip(other.0).fold(0, |other_bits, (a, b)| other_bits | (a.to_bits() ^ b.to_bits())) == 0
+    fn or_differing(self, a: Self, b: Self) -> Self {
+        let bits = |x: Self, i: usize| x.0[i].to_bits();
+        Self(per_lane(|i| f32::from_bits(bits(self, i) | (bits(a, i) ^ bits(b, i)))))
+    }
+    #[inline(always)]
+    fn is_zero(self) -> bool {
+        self.0.iter().fold(0, |all, x| all | x.to_bits()) == 0
     }
     #[inline(always)]
     fn next_up(self) -> Self {
@@ -236,10 +243,10 @@ mod avx2 {
     use std::arch::x86_64::{
         __m128, __m256, _CMP_LE_OQ, _CMP_LT_OQ, _mm256_add_epi32, _mm256_add_ps, _mm256_andnot_ps,
         _mm256_blendv_ps, _mm256_castps_si256, _mm256_castsi256_ps, _mm256_cmp_ps, _mm256_div_ps,
-        _mm256_max_ps, _mm256_min_ps, _mm256_movemask_ps, _mm256_mul_ps, _mm256_or_si256,
+        _mm256_max_ps, _mm256_min_ps, _mm256_movemask_ps, _mm256_mul_ps, _mm256_or_ps, _mm256_or_si256,
         _mm256_permute2f128_ps, _mm256_set_m128, _mm256_set1_epi32, _mm256_set1_ps, _mm256_shuffle_ps,
         _mm256_srai_epi32, _mm256_sub_ps, _mm256_testz_si256, _mm256_unpackhi_ps, _mm256_unpacklo_ps,
-        _mm256_xor_si256,
+        _mm256_xor_ps,
     };
 
     #[inline]
@@ -317,11 +324,16 @@ mod avx2 {
             bytemuck::cast(self.0)
         }
         #[inline(always)]
-        fn same_bits(self, other: Self) -> bool {
+        fn or_differing(self, a: Self, b: Self) -> Self {
+            // SAFETY: the feature is there
+            Self(unsafe { _mm256_or_ps(self.0, _mm256_xor_ps(a.0, b.0)) })
+        }
+        #[inline(always)]
+        fn is_zero(self) -> bool {
             // SAFETY: the feature is there
             unsafe {
-                let differ = _mm256_xor_si256(_mm256_castps_si256(self.0), _mm256_castps_si256(other.0));
-                _mm256_testz_si256(differ, differ) == 1
+                let bits = _mm256_castps_si256(self.0);
+                _mm256_testz_si256(bits, bits) == 1
             }
         }
         #[inline(always)]
@@ -394,7 +406,7 @@ mod tests {
             let lanes = per_lane(|i| L::load(&self.0[i]));
             let rows = L::transpose(per_lane(|i| self.0[i].first_chunk().unwrap()));
             let all = lanes.iter().map(|x| x.next_up()).chain(rows).chain([L::greatest_of_each(lanes)]);
-            let same = lanes.map(|x| u32::from(x.same_bits(lanes[0])));
+            let same = lanes.map(|x| u32::from(L::splat(0.0).or_differing(x, lanes[0]).is_zero()));
             all.map(|x| x.store().map(f32::to_bits)).chain([same]).collect()
         }
     }

@@ -66,6 +66,8 @@ pub struct Tree {
     pub(crate) rows: Vec<Row>,
     /// For each node its children's half surfaces together: room for a refit.
     pub(crate) half_areas: Vec<f64>,
+    /// Which of the rows the last refit changed: room for the next.
+    pub(crate) moved: Vec<bool>,
 }
 
 /// How large a tree is.
@@ -94,6 +96,7 @@ impl Tree {
             + size_of_val(&*self.blocks)
             + size_of_val(&*self.rows)
             + size_of_val(&*self.half_areas)
+            + size_of_val(&*self.moved)
             + size_of_val(&*self.levels)) as u64
     }
 
