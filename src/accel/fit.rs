@@ -2,16 +2,13 @@
 //! tree just built and one refitted in place go the same way.
 
 use super::collapse::Shape;
-use super::lanes::{Lanes, per_axis};
-use super::slab::{Aabb, above, below, own_margin};
-use super::tree::{Block, LEAF, NO_CHILD, NO_TRIANGLE, Node, Tree, WIDTH};
-use super::triangle::have_area;
+use super::fit_lanes::{FitBlocks, FitNodes, Mesh, Row};
+use super::lanes::{Width, per_axis};
+use super::slab::Aabb;
+use super::tree::{Block, Node, Tree, WIDTH};
 use rayon::prelude::*;
 
-/// A block's own boxes together, and its corners' box.
-type LeafBoxes = (Aabb, Aabb);
-
-/// Blocks, or nodes of a level, that one thread takes at least.
+/// Blocks, or nodes of a level, that one thread takes together.
 const GRAIN: usize = 512;
 
 impl Tree {
@@ -26,48 +23,67 @@ impl Tree {
             vertex_box: Aabb::EMPTY,
             bounds: Aabb::EMPTY,
             cost: 0.0,
-            leaf_boxes: Vec::new(),
+            rows: Vec::new(),
+            half_areas: Vec::new(),
+            moved: Vec::new(),
         };
         tree.refit(positions, triangles);
         tree
     }
 
-    /// Fits the tree as it stands to other positions, in the current rayon pool. Triangles that are made of other
+    /// Fits the tree as it stands to other positions, in the current rayon pool. Leaves whose corners stand still are left
+    /// alone, and nodes above nothing but such leaves; the tree is the one that a refit of all of it gives. Triangles that are made of other
     /// corners are taken as they are now; their number must be that which the tree was built over.
     pub fn refit(&mut self, positions: &[[f32; 3]], triangles: &[[u32; 3]]) {
+        self.refit_in(Width::detect(), positions, triangles);
+    }
+
+    /// [`Self::refit`] in lanes of a width; the tree is the same in each.
+    pub(crate) fn refit_in(&mut self, width: Width, positions: &[[f32; 3]], triangles: &[[u32; 3]]) {
         assert_eq!(triangles.len(), self.triangle_count as usize, "a tree is refitted to as many triangles");
-        // kept from refit to refit: new memory would cost as much as filling it
-        let mut boxes = std::mem::take(&mut self.leaf_boxes);
-        boxes.resize(self.blocks.len(), Aabb::EMPTY);
+        // one way into the pool, not one for each level
+        rayon::scope(|_| self.refit_here(width, &Mesh::new(positions, triangles)));
+    }
+
+    fn refit_here(&mut self, width: Width, mesh: &Mesh) {
+        let nodes = self.nodes.len();
+        let all = self.moved.is_empty();
+        self.moved.resize(nodes + self.blocks.len(), true);
+        self.rows.resize(nodes + self.blocks.len(), Row::EMPTY);
+        self.half_areas.resize(nodes, 0.0);
         self.vertex_box = self
             .blocks
-            .par_iter_mut()
-            .zip(&mut boxes)
-            .with_min_len(GRAIN)
-            .map(|(block, own)| {
-                let vertex_box;
-                (*own, vertex_box) = fit_block(block, positions, triangles);
-                vertex_box
-            })
+            .par_chunks_mut(GRAIN)
+            .zip(self.rows[nodes..].par_chunks_mut(GRAIN))
+            .zip(self.moved[nodes..].par_chunks_mut(GRAIN))
+            .map(|((blocks, rows), moved)| width.compute(FitBlocks { blocks, rows, moved, all, mesh }))
             .reduce(|| Aabb::EMPTY, |a, b| a.union(&b));
-        let mut area = 0.0;
         for level in self.levels.iter().rev() {
-            let (upper, below) = self.nodes.split_at_mut(level.end);
-            let nodes = upper[level.clone()].par_iter_mut().with_min_len(GRAIN);
-            area += nodes
-                .map(|node| {
-                    fit_node(node, |child| {
-                        if child & LEAF != 0 {
-                            boxes[(child & !LEAF) as usize]
-                        } else {
-                            below[child as usize - level.end].bounds()
-                        }
-                    })
-                })
-                .sum::<f64>();
+            let (rows, below) = self.rows.split_at_mut(level.end);
+            let (moved, moved_below) = self.moved.split_at_mut(level.end);
+            let (first, first_leaf) = (level.end, nodes - level.end);
+            self.nodes[level.clone()]
+                .par_chunks_mut(GRAIN)
+                .zip(rows[level.clone()].par_chunks_mut(GRAIN))
+                .zip(self.half_areas[level.clone()].par_chunks_mut(GRAIN))
+                .zip(moved[level.clone()].par_chunks_mut(GRAIN))
+                .for_each(|(((nodes, rows), half_areas), moved)| {
+                    let level = FitNodes {
+                        nodes,
+                        rows,
+                        half_areas,
+                        moved,
+                        below,
+                        moved_below,
+                        first,
+                        first_leaf,
+                        all,
+                    };
+                    width.compute(level);
+                });
         }
-        self.leaf_boxes = boxes;
         self.bounds = self.nodes.first().map_or(Aabb::EMPTY, Node::bounds);
+        let area: f64 = self.half_areas.iter().sum();
         let whole = half_area(&self.bounds);
         self.cost = if whole > 0.0 && area.is_finite() { area / whole } else { 0.0 };
     }
@@ -96,72 +112,102 @@ fn half_area(b: &Aabb) -> f64 {
     x * y + y * z + z * x
 }
 
-/// Takes the boxes of a node's children; gives the sum of their half surfaces.
-fn fit_node(node: &mut Node, box_of: impl Fn(u32) -> Aabb) -> f64 {
-    let mut area = 0.0;
-    for lane in 0..WIDTH {
-        let child = node.children[lane];
-        let b = if child == NO_CHILD { Aabb::EMPTY } else { box_of(child) };
-        for axis in 0..3 {
-            node.planes[0][axis][lane] = b.min[axis];
-            node.planes[1][axis][lane] = b.max[axis];
-        }
-        area += half_area(&b);
-    }
-    area
-}
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::accel::tree::{LEAF, NO_CHILD, NO_TRIANGLE};
+    use crate::accel::triangle::has_area;
+    use crate::accel::{Quality, validate};
 
-/// Takes a block's corners; what has no area becomes NaN, which no test hits. All lanes go side by side: plain loops
-/// over eight floats, which become vector instructions.
-fn fit_block(block: &mut Block, positions: &[[f32; 3]], triangles: &[[u32; 3]]) -> LeafBoxes {
-    let mut corners = [[[f32::NAN; WIDTH]; 3]; 3];
-    for (lane, &triangle) in block.triangles.iter().enumerate() {
-        if triangle == NO_TRIANGLE {
-            break;
+    /// Triangles of all sorts over points of which some are equal, far, tiny or broken.
+    fn mesh(turn: u32) -> (Vec<[f32; 3]>, Vec<[u32; 3]>) {
+        let mut positions: Vec<[f32; 3]> = (0..9_000_u32)
+            .map(|i| [i.wrapping_mul(37 + turn) % 101, i * 53 % 103, i % 97].map(|x| x as f32 - 50.0))
+            .collect();
+        for (i, x) in
+            [0.0, -0.0, 1e-45, -1e-40, 1e-20, 3e38, -3e38, f32::INFINITY, f32::NAN].into_iter().enumerate()
+        {
+            positions[17 * i] = [x, 1.0, x];
+            positions[17 * i + 1] = [x, x, x];
         }
-        for (to, i) in corners.iter_mut().zip(triangles[triangle as usize]) {
-            let p = positions[i as usize];
-            for (to, x) in to.iter_mut().zip(p) {
-                to[lane] = x;
+        let n = positions.len() as u32;
+        let triangles = (0..n).map(|i| [i, (i + 1 + i % 2) % n, (i * 7 + i % 3) % n]);
+        (positions.clone(), triangles.collect())
+    }
+
+    fn bits(tree: &Tree) -> (Vec<u32>, Vec<u32>, u64) {
+        let of = |x: &f32| if x.is_nan() { u32::MAX } else { x.to_bits() };
+        let planes = tree.nodes.iter().flat_map(|n| n.planes.as_flattened().as_flattened());
+        let corners = tree.blocks.iter().flat_map(|b| b.corners.as_flattened().as_flattened());
+        (planes.map(of).collect(), corners.map(of).collect(), tree.cost().to_bits())
+    }
+
+    #[test]
+    fn every_width_and_number_of_threads_fits_the_same_tree() {
+        let (positions, triangles) = mesh(0);
+        let (moved, _) = mesh(2);
+        let mut tree = Tree::build(&positions, &triangles, Quality::Fastest);
+        for positions in [&positions, &moved] {
+            tree.refit_in(Width::Portable, positions, &triangles);
+            assert_eq!(validate(&tree, positions, &triangles), Ok(()));
+            for width in Width::available() {
+                for threads in [1, 3] {
+                    let mut other = tree.clone();
+                    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+                    pool.install(|| other.refit_in(*width, &mesh(4).0, &triangles));
+                    assert!(bits(&other) != bits(&tree));
+                    pool.install(|| other.refit_in(*width, positions, &triangles));
+                    assert!(bits(&other) == bits(&tree), "{width:?}, {threads} threads");
+                    assert_eq!(other.vertex_box(), tree.vertex_box());
+                }
             }
         }
     }
-    let has_area = have_area(&corners);
-    for axis in corners.as_flattened_mut() {
-        for (x, has_area) in axis.iter_mut().zip(has_area) {
-            *x = if has_area { *x } else { f32::NAN };
-        }
-    }
-    let [a, b, c] = &corners;
-    let mut least = [[0.0; WIDTH]; 3];
-    let mut greatest = [[0.0; WIDTH]; 3];
-    for k in 0..3 {
-        for lane in 0..WIDTH {
-            least[k][lane] = Lanes::min(a[k][lane], Lanes::min(b[k][lane], c[k][lane]));
-            greatest[k][lane] = Lanes::max(a[k][lane], Lanes::max(b[k][lane], c[k][lane]));
-        }
-    }
-    let [mut own_least, mut own_greatest] = [least, greatest];
-    for lane in 0..WIDTH {
-        let size = |k: usize| greatest[k][lane] - least[k][lane];
-        let margin = own_margin([size(0), size(1), size(2)]);
-        for k in 0..3 {
-            own_least[k][lane] = below(least[k][lane], margin);
-            own_greatest[k][lane] = above(greatest[k][lane], margin);
-        }
-    }
-    block.corners = corners;
-    (union(&own_least, &own_greatest), union(&least, &greatest))
-}
 
-/// The box of the lanes' boxes; those that are NaN are left aside.
-fn union(least: &[[f32; WIDTH]; 3], greatest: &[[f32; WIDTH]; 3]) -> Aabb {
-    // the first operand is given where one is NaN
-    let fold = |lanes: &[f32; WIDTH], empty: f32, wins: fn(f32, f32) -> bool| {
-        lanes.iter().fold(empty, |all, &x| if wins(x, all) { x } else { all })
-    };
-    Aabb {
-        min: per_axis(|k| fold(&least[k], f32::INFINITY, |x, all| x < all)),
-        max: per_axis(|k| fold(&greatest[k], f32::NEG_INFINITY, |x, all| x > all)),
+    #[test]
+    fn what_stands_still_is_left_as_a_whole_refit_leaves_it() {
+        let (positions, mut triangles) = mesh(0);
+        let mut tree = Tree::build(&positions, &triangles, Quality::Fastest);
+        let mut moved = positions.clone();
+        for range in [4_000..4_100, 0..200, 8_999..9_000, 0..9_000, 5..5] {
+            moved[range.clone()].copy_from_slice(&mesh(6).0[range]);
+            triangles[4_321].swap(0, 1);
+            let mut whole = tree.clone();
+            whole.moved.clear();
+            for tree in [&mut tree, &mut whole] {
+                tree.refit(&moved, &triangles);
+                assert_eq!(validate(tree, &moved, &triangles), Ok(()));
+            }
+            assert!(bits(&tree) == bits(&whole));
+            assert_eq!(tree.vertex_box(), whole.vertex_box());
+        }
+        tree.refit(&moved, &triangles);
+        let still = tree.moved.iter().filter(|moved| !**moved).count();
+        assert!(still > tree.moved.len() / 2, "{still} of {}", tree.moved.len());
+    }
+
+    #[test]
+    fn a_childs_box_is_that_of_what_is_below_and_no_larger() {
+        let (positions, triangles) = mesh(0);
+        let tree = Tree::build(&positions, &triangles, Quality::Fastest);
+        let corners = |t: u32| triangles[t as usize].map(|i| positions[i as usize]);
+        let with_area = |numbers: &[u32]| -> Vec<[[f32; 3]; 3]> {
+            numbers.iter().filter(|&&t| t != NO_TRIANGLE).map(|&t| corners(t)).filter(has_area).collect()
+        };
+        for node in &tree.nodes {
+            for (lane, &child) in node.children.iter().enumerate() {
+                let expected = if child == NO_CHILD {
+                    Aabb::EMPTY
+                } else if child & LEAF == 0 {
+                    tree.nodes[child as usize].bounds()
+                } else {
+                    let block = &tree.blocks[(child & !LEAF) as usize];
+                    with_area(&block.triangles).iter().fold(Aabb::EMPTY, |b, t| b.union(&Aabb::own(t)))
+                };
+                assert_eq!(node.child_box(lane), expected);
+            }
+        }
+        let all: Vec<u32> = (0..triangles.len() as u32).collect();
+        assert_eq!(tree.vertex_box(), Aabb::of_points(with_area(&all).as_flattened()));
     }
 }

@@ -7,6 +7,12 @@ pub(crate) fn per_axis<T>(mut of: impl FnMut(usize) -> T) -> [T; 3] {
     [of(0), of(1), of(2)]
 }
 
+/// One value a lane, likewise.
+#[inline(always)]
+pub(crate) fn per_lane<T>(mut of: impl FnMut(usize) -> T) -> [T; 8] {
+    [of(0), of(1), of(2), of(3), of(4), of(5), of(6), of(7)]
+}
+
 /// One or more floats that are computed together. Nothing is fused; `min` and `max` give the second operand where the
 /// first is not less (not greater), as x86 does, so NaN and the sign of zero agree too.
 pub(crate) trait Lanes: Copy {
@@ -36,6 +42,24 @@ pub(crate) trait Lanes8: Lanes {
     fn load(from: &[f32; 8]) -> Self;
     /// To memory.
     fn store(self) -> [f32; 8];
+    /// These bits, and those that differ in two others.
+    fn or_differing(self, a: Self, b: Self) -> Self;
+    /// Whether no bit is set.
+    fn is_zero(self) -> bool;
+    /// The next greater float; what is not finite stays. Like `f32::next_up`, but without branches.
+    fn next_up(self) -> Self;
+    /// The first three floats of eight rows side by side.
+    fn transpose(rows: [&[f32; 4]; 8]) -> [Self; 3];
+    /// The greatest lane of each; none of them NaN.
+    fn greatest_of_each(of: [Self; 8]) -> Self;
+}
+
+/// What is computed in lanes of any width, always with the same answer.
+pub(crate) trait InLanes {
+    /// The answer.
+    type Output;
+    /// Computes it. To be inlined always.
+    fn compute<L: Lanes8>(self) -> Self::Output;
 }
 
 /// What the floats of this machine come in.
@@ -61,6 +85,29 @@ impl Width {
         }
         &[Self::Portable]
     }
+
+    /// Computes in this width; portably where the machine lacks it.
+    pub(crate) fn compute<T: InLanes>(self, what: T) -> T::Output {
+        #[cfg(target_arch = "x86_64")]
+        if self == Self::Avx2 && std::arch::is_x86_feature_detected!("avx2") {
+            // SAFETY: the feature was just found
+            return unsafe { avx2::compute(what) };
+        }
+        what.compute::<Portable>()
+    }
+}
+
+/// Asks for the cache line of an element that will be read soon; nothing where there is none.
+#[inline(always)]
+pub(crate) fn prefetch<T>(from: &[T], at: usize) {
+    #[cfg(target_arch = "x86_64")]
+    if at < from.len() {
+        use std::arch::x86_64::{_MM_HINT_T0, _mm_prefetch};
+        // SAFETY: reads nothing, faults nowhere, and SSE is part of the architecture
+        unsafe { _mm_prefetch::<_MM_HINT_T0>(from.as_ptr().wrapping_add(at).cast()) };
+    }
+    #[cfg(not(target_arch = "x86_64"))]
+    let _ = (from, at);
 }
 
 impl Lanes for f32 {
@@ -169,6 +216,35 @@ impl Lanes8 for Portable {
     fn store(self) -> [f32; 8] {
         self.0
     }
+    #[inline(always)]
+    fn or_differing(self, a: Self, b: Self) -> Self {
+        let bits = |x: Self, i: usize| x.0[i].to_bits();
+        Self(per_lane(|i| f32::from_bits(bits(self, i) | (bits(a, i) ^ bits(b, i)))))
+    }
+    #[inline(always)]
+    fn is_zero(self) -> bool {
+        self.0.iter().fold(0, |all, x| all | x.to_bits()) == 0
+    }
+    #[inline(always)]
+    fn next_up(self) -> Self {
+        Self(per_lane(|i| next_up(self.0[i])))
+    }
+    #[inline(always)]
+    fn transpose(rows: [&[f32; 4]; 8]) -> [Self; 3] {
+        per_axis(|k| Self(per_lane(|i| rows[i][k])))
+    }
+    #[inline(always)]
+    fn greatest_of_each(of: [Self; 8]) -> Self {
+        Self(per_lane(|i| of[i].0.into_iter().fold(f32::NEG_INFINITY, |all, x| Lanes::max(x, all))))
+    }
+}
+
+/// The next greater float; what is not finite stays. Like `f32::next_up`, but without branches.
+#[inline(always)]
+pub(crate) fn next_up(x: f32) -> f32 {
+    let bits = (x + 0.0).to_bits();
+    let next = if bits >> 31 == 0 { bits + 1 } else { bits - 1 };
+    if x.is_finite() { f32::from_bits(next) } else { x }
 }
 
 #[cfg(target_arch = "x86_64")]
@@ -176,11 +252,26 @@ pub(crate) use avx2::Avx2;
 
 #[cfg(target_arch = "x86_64")]
 mod avx2 {
-    use super::{Lanes, Lanes8};
+    use super::{InLanes, Lanes, Lanes8, per_lane};
     use std::arch::x86_64::{
-        __m256, _CMP_LE_OQ, _CMP_LT_OQ, _mm256_add_ps, _mm256_cmp_ps, _mm256_div_ps, _mm256_max_ps,
-        _mm256_min_ps, _mm256_movemask_ps, _mm256_mul_ps, _mm256_set1_ps, _mm256_sub_ps,
+        __m128, __m256, _CMP_LE_OQ, _CMP_LT_OQ, _mm256_add_epi32, _mm256_add_ps, _mm256_andnot_ps,
+        _mm256_blendv_ps, _mm256_castps_si256, _mm256_castsi256_ps, _mm256_cmp_ps, _mm256_div_ps,
+        _mm256_max_ps, _mm256_min_ps, _mm256_movemask_ps, _mm256_mul_ps, _mm256_or_ps, _mm256_or_si256,
+        _mm256_permute2f128_ps, _mm256_set_m128, _mm256_set1_epi32, _mm256_set1_ps, _mm256_shuffle_ps,
+        _mm256_srai_epi32, _mm256_sub_ps, _mm256_testz_si256, _mm256_unpackhi_ps, _mm256_unpacklo_ps,
+        _mm256_xor_ps,
     };
+
+    #[inline]
+    #[target_feature(enable = "avx2")]
+    fn max_of_halves(a: __m256, b: __m256) -> __m256 {
+        _mm256_max_ps(_mm256_unpacklo_ps(a, b), _mm256_unpackhi_ps(a, b))
+    }
+
+    #[target_feature(enable = "avx2")]
+    pub(super) fn compute<T: InLanes>(what: T) -> T::Output {
+        what.compute::<Avx2>()
+    }
 
     /// Eight floats in an AVX register. Only functions that enable the feature instantiate formulas with it, and those
     /// are entered only where [`super::Width::detect`] found it: that is what every SAFETY comment below means by
@@ -245,5 +336,109 @@ mod avx2 {
         fn store(self) -> [f32; 8] {
             bytemuck::cast(self.0)
         }
+        #[inline(always)]
+        fn or_differing(self, a: Self, b: Self) -> Self {
+            // SAFETY: the feature is there
+            Self(unsafe { _mm256_or_ps(self.0, _mm256_xor_ps(a.0, b.0)) })
+        }
+        #[inline(always)]
+        fn is_zero(self) -> bool {
+            // SAFETY: the feature is there
+            unsafe {
+                let bits = _mm256_castps_si256(self.0);
+                _mm256_testz_si256(bits, bits) == 1
+            }
+        }
+        #[inline(always)]
+        fn next_up(self) -> Self {
+            // SAFETY: the feature is there
+            Self(unsafe {
+                // +0 for -0
+                let bits = _mm256_castps_si256(_mm256_add_ps(self.0, _mm256_set1_ps(0.0)));
+                let step = _mm256_or_si256(_mm256_srai_epi32::<31>(bits), _mm256_set1_epi32(1));
+                let next = _mm256_castsi256_ps(_mm256_add_epi32(bits, step));
+                let size = _mm256_andnot_ps(_mm256_set1_ps(-0.0), self.0);
+                let is_finite = _mm256_cmp_ps::<_CMP_LT_OQ>(size, _mm256_set1_ps(f32::INFINITY));
+                _mm256_blendv_ps(self.0, next, is_finite)
+            })
+        }
+        #[inline(always)]
+        fn transpose(rows: [&[f32; 4]; 8]) -> [Self; 3] {
+            let [a, b, c, d, e, f, g, h] = per_lane(|i| bytemuck::cast::<_, __m128>(*rows[i]));
+            // SAFETY: the feature is there
+            unsafe {
+                let [a, b, c, d] = [
+                    _mm256_set_m128(e, a),
+                    _mm256_set_m128(f, b),
+                    _mm256_set_m128(g, c),
+                    _mm256_set_m128(h, d),
+                ];
+                let (xy01, xy23) = (_mm256_unpacklo_ps(a, b), _mm256_unpacklo_ps(c, d));
+                let (z01, z23) = (_mm256_unpackhi_ps(a, b), _mm256_unpackhi_ps(c, d));
+                [
+                    Self(_mm256_shuffle_ps::<0x44>(xy01, xy23)),
+                    Self(_mm256_shuffle_ps::<0xee>(xy01, xy23)),
+                    Self(_mm256_shuffle_ps::<0x44>(z01, z23)),
+                ]
+            }
+        }
+        #[inline(always)]
+        fn greatest_of_each(of: [Self; 8]) -> Self {
+            // SAFETY: the feature is there
+            unsafe {
+                // each step leaves half the lanes of two
+                let [a, b, c, d] = [
+                    max_of_halves(of[0].0, of[1].0),
+                    max_of_halves(of[2].0, of[3].0),
+                    max_of_halves(of[4].0, of[5].0),
+                    max_of_halves(of[6].0, of[7].0),
+                ];
+                let a = _mm256_max_ps(_mm256_shuffle_ps::<0x44>(a, b), _mm256_shuffle_ps::<0xee>(a, b));
+                let b = _mm256_max_ps(_mm256_shuffle_ps::<0x44>(c, d), _mm256_shuffle_ps::<0xee>(c, d));
+                Self(_mm256_max_ps(
+                    _mm256_permute2f128_ps::<0x20>(a, b),
+                    _mm256_permute2f128_ps::<0x31>(a, b),
+                ))
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// All that is more than arithmetic, as bits.
+    struct Moves<'a>(&'a [[f32; 8]; 8]);
+
+    impl InLanes for Moves<'_> {
+        type Output = Vec<[u32; 8]>;
+
+        #[inline(always)]
+        fn compute<L: Lanes8>(self) -> Self::Output {
+            let lanes = per_lane(|i| L::load(&self.0[i]));
+            let rows = L::transpose(per_lane(|i| self.0[i].first_chunk().unwrap()));
+            let all = lanes.iter().map(|x| x.next_up()).chain(rows).chain([L::greatest_of_each(lanes)]);
+            let same = lanes.map(|x| u32::from(L::splat(0.0).or_differing(x, lanes[0]).is_zero()));
+            all.map(|x| x.store().map(f32::to_bits)).chain([same]).collect()
+        }
+    }
+
+    #[test]
+    fn every_width_moves_lanes_alike() {
+        let (up, down) = (f32::INFINITY, f32::NEG_INFINITY);
+        let mut from: [[f32; 8]; 8] =
+            std::array::from_fn(|i| std::array::from_fn(|k| (i * 37 + k * 11) as f32 % 17.0 - 8.0));
+        from[3] = [0.0, -0.0, up, down, f32::MAX, f32::MIN, 1e-45, -1e-45];
+        from[5] = [down; 8];
+        from[7] = from[0];
+        for width in Width::available() {
+            assert_eq!(width.compute(Moves(&from)), Width::Portable.compute(Moves(&from)));
+        }
+        let moved = Width::detect().compute(Moves(&from));
+        assert_eq!(moved[8], std::array::from_fn(|i| from[i][0].to_bits()));
+        assert_eq!(moved[10], std::array::from_fn(|i| from[i][2].to_bits()));
+        assert_eq!(moved[11].map(f32::from_bits)[3..6], [up, from[4].into_iter().fold(down, f32::max), down]);
+        assert_eq!(moved[12], [1, 0, 0, 0, 0, 0, 0, 1]);
     }
 }

@@ -14,6 +14,7 @@ mod binary;
 mod brute;
 mod collapse;
 mod fit;
+mod fit_lanes;
 mod interval;
 mod lanes;
 mod origin;

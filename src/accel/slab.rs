@@ -2,7 +2,7 @@
 //! another is never entered later nor missed (every step is monotonic in the planes).
 
 use super::Ray;
-use super::lanes::{Lanes, per_axis};
+use super::lanes::{Lanes, next_up, per_axis};
 
 /// Factor on the exit of a box. Let u = 2⁻²⁴. The slab test's own roundings need 1 + 6u (Ize, "Robust BVH Ray
 /// Traversal", 2013: 1 + 2γ₃); the edge test sees a vertex displaced by up to 4u of its distance from the origin,
@@ -64,28 +64,20 @@ impl Aabb {
 
 /// By how much a triangle's own box is larger than its corners'.
 #[inline(always)]
-pub(crate) fn own_margin(size: [f32; 3]) -> f32 {
-    Lanes::max(size[0], Lanes::max(size[1], size[2])) * (8.0 * f32::EPSILON)
+pub(crate) fn own_margin<L: Lanes>(size: [L; 3]) -> L {
+    size[0].max(size[1].max(size[2])).mul(L::splat(8.0 * f32::EPSILON))
 }
 
 /// The least side of an own box.
 #[inline(always)]
-pub(crate) fn below(min: f32, margin: f32) -> f32 {
+fn below(min: f32, margin: f32) -> f32 {
     -next_up(margin - min)
 }
 
 /// The greatest side of an own box.
 #[inline(always)]
-pub(crate) fn above(max: f32, margin: f32) -> f32 {
+fn above(max: f32, margin: f32) -> f32 {
     next_up(max + margin)
-}
-
-/// The next greater float; what is not finite stays. Like `f32::next_up`, but without branches.
-#[inline(always)]
-fn next_up(x: f32) -> f32 {
-    let bits = (x + 0.0).to_bits();
-    let next = if bits >> 31 == 0 { bits + 1 } else { bits - 1 };
-    if x.is_finite() { f32::from_bits(next) } else { x }
 }
 
 /// 1 / a direction's component; what is below [`LEAST_DIRECTION`] counts as that.

@@ -3,6 +3,7 @@
 
 use super::binary::{Binary, Quality};
 use super::collapse::Shape;
+use super::fit_lanes::Row;
 use super::lanes::per_axis;
 use super::slab::Aabb;
 use std::ops::Range;
@@ -60,8 +61,13 @@ pub struct Tree {
     /// The box of the root's children.
     pub(crate) bounds: Aabb,
     pub(crate) cost: f64,
-    /// The own boxes of each leaf's triangles together: room for a refit.
-    pub(crate) leaf_boxes: Vec<Aabb>,
+    /// The boxes of all nodes, then of all leaves (the own boxes of their triangles together): room for a refit, for new
+    /// memory would cost as much as filling it.
+    pub(crate) rows: Vec<Row>,
+    /// For each node its children's half surfaces together: room for a refit.
+    pub(crate) half_areas: Vec<f64>,
+    /// Which of the rows the last refit changed: room for the next.
+    pub(crate) moved: Vec<bool>,
 }
 
 /// How large a tree is.
@@ -88,7 +94,9 @@ impl Tree {
         (size_of::<Self>()
             + size_of_val(&*self.nodes)
             + size_of_val(&*self.blocks)
-            + size_of_val(&*self.leaf_boxes)
+            + size_of_val(&*self.rows)
+            + size_of_val(&*self.half_areas)
+            + size_of_val(&*self.moved)
             + size_of_val(&*self.levels)) as u64
     }
 

@@ -121,25 +121,27 @@ pub fn has_area(corners: &[[f32; 3]; 3]) -> bool {
     n.iter().all(|x| x.is_finite()) && n != [0.0; 3]
 }
 
-/// [`has_area`] of eight triangles side by side, by corner, axis, lane.
-pub(crate) fn have_area(corners: &[[[f32; 8]; 3]; 3]) -> [bool; 8] {
+/// Lanes of triangles that surely have area, by corner and axis: most that have, none that have not.
+///
+/// With u = 2⁻²⁴, each of the normal's six products is within 3u of itself and 2⁻¹⁴⁹ of the true one, each difference
+/// within u. Where the components' sizes together are 16u of the products' sizes together and 2⁻¹⁰⁰ at least, rounding
+/// is less than half of that, so that the true normal is not 0, nor is it in f64, whose roundings are 2⁻²⁹ of those.
+/// What is not finite makes the products' sum so, and nothing is greater than that.
+#[inline(always)]
+pub(crate) fn surely_have_area<L: Lanes>(corners: &[[L; 3]; 3]) -> u32 {
     let [a, b, c] = corners;
-    let mut sums = [0.0_f64; 8];
-    let mut are_finite = [true; 8];
-    for [x, y] in [[0, 1], [1, 2], [2, 0]] {
-        for lane in 0..8 {
-            let edge = |p: &[[f32; 8]; 3], k: usize| f64::from(p[k][lane]) - f64::from(a[k][lane]);
-            let n = edge(b, x) * edge(c, y) - edge(b, y) * edge(c, x);
-            are_finite[lane] &= n.is_finite();
-            sums[lane] += if n == 0.0 { 0.0 } else { 1.0 };
-        }
-    }
-    let mut has_area = [false; 8];
-    for lane in 0..8 {
-        has_area[lane] = are_finite[lane] && sums[lane] > 0.0;
-    }
-    has_area
+    let e = per_axis(|k| b[k].sub(a[k]));
+    let f = per_axis(|k| c[k].sub(a[k]));
+    let size = |x: L| x.max(L::splat(0.0).sub(x));
+    let products = per_axis(|k| (e[(k + 1) % 3].mul(f[(k + 2) % 3]), e[(k + 2) % 3].mul(f[(k + 1) % 3])));
+    let sum = |[x, y, z]: [L; 3]| x.add(y).add(z);
+    let normal = sum(per_axis(|k| size(products[k].0.sub(products[k].1))));
+    let terms = sum(per_axis(|k| size(products[k].0).add(size(products[k].1))));
+    terms.mul(L::splat(16.0 / 16_777_216.0)).max(L::splat(LEAST_SURE_NORMAL)).lt(normal)
 }
+
+/// 2⁻¹⁰⁰: below this, see [`surely_have_area`].
+const LEAST_SURE_NORMAL: f32 = f32::from_bits(27 << 23);
 
 /// What is looked for along a ray: the first candidate strictly between two places of the order.
 #[derive(Clone, Copy, Debug)]
@@ -263,5 +265,38 @@ mod tests {
         assert!(!has_area(&[[f32::NAN, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]));
         assert!(has_area(&[[0.0; 3], [1e-30, 0.0, 0.0], [0.0, 1e-30, 0.0]]));
         assert!(has_area(&[[-3e38; 3], [3e38, 0.0, 0.0], [0.0, 3e38, 0.0]]));
+    }
+
+    #[test]
+    fn what_surely_has_area_has_it() {
+        let special = [0.0, -0.0, 1.0, -1.0, 1e-45, 1e-38, 1e-25, 1e-20, 1e25, 3e38, f32::INFINITY, f32::NAN];
+        let mut state = 1_u32;
+        let mut random = || {
+            state = state.wrapping_mul(0x915f_77f5).wrapping_add(0x9e37_79b9);
+            state >> 8
+        };
+        let (mut sure, mut without, mut doubtful) = (0, 0, 0);
+        for round in 0..200_000 {
+            let mut float = || match round % 4 {
+                0 => special[random() as usize % special.len()],
+                1 => f32::from_bits(random() << 8 ^ random()),
+                _ => random() as f32 / 16_777_216.0 - 0.5,
+            };
+            let mut corners: [[f32; 3]; 3] =
+                [[float(), float(), float()], [float(), float(), float()], [float(), float(), float()]];
+            if round % 4 == 3 {
+                // nearly or wholly on a line
+                let along = random() as f32 / 16_777_216.0;
+                corners[2] = per_axis(|k| corners[0][k] + along * (corners[1][k] - corners[0][k]));
+            }
+            let is_sure = surely_have_area(&corners) == 1;
+            assert!(!is_sure || has_area(&corners), "{corners:?}");
+            doubtful += u32::from(round % 4 == 2 && !is_sure);
+            sure += u32::from(is_sure);
+            without += u32::from(!has_area(&corners));
+        }
+        assert!(sure > 50_000 && without > 10_000 && doubtful < 10, "{sure} {without} {doubtful}");
+        let tiny = [[0.0; 3], [1e-30, 0.0, 0.0], [0.0, 1e-30, 0.0]];
+        assert_eq!((surely_have_area(&tiny), has_area(&tiny)), (0, true));
     }
 }
