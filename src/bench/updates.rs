@@ -52,7 +52,7 @@ pub(super) fn updates(bench: &Bench, on_event: &mut dyn FnMut(&Event<'_>)) -> Re
     on_event(&Event::Stage("warm frames"));
     let rates = &findings.tables[0];
     let rate =
-        |name: &str| rates.rows.iter().find(|(row, _)| row == name).and_then(|(_, cells)| cells[3].value());
+        |name: &str| rates.rows.iter().find(|(row, _)| row == name).and_then(|(_, cells)| cells[4].value());
     let refit_ms = |name: &str| {
         let mesh = meshes.iter().find(|mesh| name.starts_with(&mesh.name))?;
         mesh.embree.as_ref()?.refit_one_thread_ms
