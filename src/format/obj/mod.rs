@@ -7,6 +7,8 @@
 mod again;
 mod check;
 mod face;
+#[cfg(target_arch = "x86_64")]
+mod lines;
 mod mesh;
 mod scan;
 #[cfg(test)]
