@@ -5,7 +5,7 @@
 use super::number::{BEHIND_F32, HALFWAY, INVERSE_POWERS, NEAR_HALFWAY};
 use super::wide::{self, WINDOW, Window, eights, through};
 use std::arch::x86_64::{
-    __m128i, __m256d, __m256i, _mm_and_si128, _mm_shuffle_epi8, _mm_xor_si128, _mm256_add_pd,
+    __m128i, __m256d, __m256i, _mm_and_si128, _mm_or_ps, _mm_shuffle_epi8, _mm_xor_si128, _mm256_add_pd,
     _mm256_and_si256, _mm256_castsi256_si128, _mm256_cmpgt_epi64, _mm256_cvtepi32_pd, _mm256_cvtpd_ps,
     _mm256_extracti128_si256, _mm256_mul_pd, _mm256_permutevar8x32_epi32, _mm256_set1_epi64x, _mm256_set1_pd,
     _mm256_sub_epi64, _mm256_testz_si256,
@@ -64,7 +64,12 @@ fn rows_wide<const N: usize>(
 ) -> Option<usize> {
     let mut end = None;
     let mut at = start;
-    while text.get(at..).is_some_and(|line| line.starts_with(word))
+    // compared as a number, which is no call
+    let mut padded = [0; 4];
+    padded[..word.len()].copy_from_slice(word);
+    let (expected, mask) = (u32::from_le_bytes(padded), u32::MAX >> (32 - 8 * word.len()));
+    while let Some(first) = text.get(at..).and_then(<[u8]>::first_chunk)
+        && u32::from_le_bytes(*first) & mask == expected
         && let Some((values, next)) = row(text, at + word.len())
     {
         list.push(values);
@@ -117,8 +122,7 @@ fn row<const N: usize>(text: &[u8], at: usize) -> Option<([f32; N], usize)> {
         numbers[k] = _mm_and_si128(whole, bytemuck::cast(keep));
         powers[k] = INVERSE_POWERS[decimals[k] & 15];
     }
-    let values = scaled(numbers, powers)?;
-    let values: [f32; N] = std::array::from_fn(|k| f32::from_bits(values[k].to_bits() | signs[k]));
+    let values = scaled(numbers, powers, signs)?;
     Some((values, at + line_end.trailing_zeros() as usize + length))
 }
 
@@ -133,10 +137,11 @@ fn first<const N: usize>(mut bits: u64) -> Option<[usize; N]> {
     (bits == 0 && places[N - 1] < WINDOW).then_some(places)
 }
 
-/// Four numbers of sixteen digits, fifteen at most not 0, times powers of ten. None where one may be rounded otherwise.
+/// Numbers of sixteen digits, the first of them 0, times powers of ten and with the signs' bits. None where one may be
+/// rounded otherwise.
 #[inline]
 #[target_feature(enable = "avx2,bmi1,bmi2")]
-fn scaled([a, b, c, d]: [__m128i; 4], powers: [f64; 4]) -> Option<[f32; 4]> {
+fn scaled<const N: usize>([a, b, c, d]: [__m128i; 4], powers: [f64; 4], signs: [u32; 4]) -> Option<[f32; N]> {
     // each lane: the upper and lower eight digits of one, then of another
     let halves = eights(bytemuck::cast([a, b]), bytemuck::cast([c, d]));
     let halves = _mm256_permutevar8x32_epi32(halves, bytemuck::cast([0u32, 4, 2, 6, 1, 5, 3, 7]));
@@ -151,7 +156,8 @@ fn scaled([a, b, c, d]: [__m128i; 4], powers: [f64; 4]) -> Option<[f32; 4]> {
     if _mm256_testz_si256(is_above, is_below) == 0 {
         return None;
     }
-    Some(bytemuck::cast(_mm256_cvtpd_ps(values)))
+    let values: [f32; 4] = bytemuck::cast(_mm_or_ps(_mm256_cvtpd_ps(values), bytemuck::cast(signs)));
+    values.first_chunk().copied()
 }
 
 #[cfg(test)]

@@ -22,9 +22,6 @@ pub(super) const HALFWAY: u64 = 0x1000_0000;
 /// How near to that an f64 of 2 units' error in the last place must not come, in such units.
 pub(super) const NEAR_HALFWAY: u64 = 4;
 
-/// Digits that surely fit a `u64`.
-const MAX_DIGITS: usize = 18;
-
 /// The byte at `at`; a line ends where the text ends.
 #[inline]
 pub(super) fn byte(text: &[u8], at: usize) -> u8 {
@@ -157,10 +154,7 @@ fn plain_decimal(text: &[u8], start: usize) -> Option<(f32, usize)> {
             let (value, n) = digits(text, at);
             decimals += n;
             at += n;
-            if count + decimals > MAX_DIGITS {
-                return None;
-            }
-            mantissa = mantissa * INTEGER_POWERS[n] + value;
+            mantissa = mantissa.checked_mul(INTEGER_POWERS[n])?.checked_add(value)?;
             if n < 8 {
                 break;
             }

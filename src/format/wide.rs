@@ -61,16 +61,15 @@ impl Window {
     }
 }
 
-/// Pairs of fours of digits, each byte from 0 to 9, as the values of four each: those of `a` and `b` by turns of 16
-/// bytes, the value of eight in 32 bits.
+/// The values of each eight digits, each byte from 0 to 9: of the first sixteen bytes of `a`, then of those of `b`, then
+/// of the others of both.
 #[inline]
 #[target_feature(enable = "avx2,bmi1,bmi2")]
 pub(super) fn eights(a: __m256i, b: __m256i) -> __m256i {
-    let fours = |digits: __m256i| {
-        let pairs = _mm256_maddubs_epi16(digits, _mm256_set1_epi16(10 | 1 << 8));
-        _mm256_madd_epi16(pairs, _mm256_set1_epi32(100 | 1 << 16))
-    };
-    _mm256_madd_epi16(_mm256_packus_epi32(fours(a), fours(b)), _mm256_set1_epi32(10_000 | 1 << 16))
+    // times 10 and 1, 100 and 1, 10,000 and 1
+    let (tens, hundreds) = (_mm256_set1_epi16(0x010A), _mm256_set1_epi32(0x0001_0064));
+    let fours = |digits| _mm256_madd_epi16(_mm256_maddubs_epi16(digits, tens), hundreds);
+    _mm256_madd_epi16(_mm256_packus_epi32(fours(a), fours(b)), _mm256_set1_epi32(0x0001_2710))
 }
 
 /// The values of four times eight digits, each byte from 0 to 9, the first in the lowest.

@@ -28,7 +28,7 @@ pub(super) fn faces(text: &[u8], start: usize, faces: &mut FaceList) -> Option<u
 fn faces_wide(text: &[u8], start: usize, faces: &mut FaceList) -> Option<usize> {
     let mut end = None;
     let mut at = start;
-    while text.get(at..at + 2) == Some(b"f ") {
+    while is_face(text, at) {
         let before = faces.positions.len();
         let Some(next) = face(text, at + 2, faces) else {
             faces.truncate(before);
@@ -39,6 +39,11 @@ fn faces_wide(text: &[u8], start: usize, faces: &mut FaceList) -> Option<usize> 
         end = Some(next);
     }
     end
+}
+
+#[inline]
+fn is_face(text: &[u8], at: usize) -> bool {
+    text.get(at..).and_then(<[u8]>::first_chunk) == Some(b"f ")
 }
 
 /// Reads the corners of a face; the place behind its line. None where they are not of the usual form or fewer than
@@ -56,13 +61,12 @@ fn face(text: &[u8], start: usize, faces: &mut FaceList) -> Option<usize> {
         let line_end = line_end & line_end.wrapping_neg();
         let to_line_end = through(line_end);
         // the blanks behind corners, and the line's end
-        let ends = (window.of(b' ') & to_line_end) | line_end;
-        if ends == 0 {
-            return None;
-        }
-        let last = 63 - ends.leading_zeros();
+        let blanks = window.of(b' ') & to_line_end;
+        let last = (blanks | line_end).checked_ilog2()?;
         let whole = u64::MAX >> (63 - last);
-        let marks = others & whole;
+        // behind a blank the line's end ends no corner
+        let ends = blanks | (line_end & !(blanks << 1));
+        let marks = others & whole & (!line_end | ends);
         let first = marks.trailing_zeros() as usize;
         let is_end = |bits: u64| bits & bits.wrapping_neg() & ends != 0;
         let behind = marks & marks.wrapping_sub(1);
@@ -193,8 +197,8 @@ fn similar_wide(
     let (mut faces, mut same) = (0, 0);
     while same < SAME_IN_A_ROW
         && let Some(&count) = counts.get(faces)
-        && known.get(known_at..known_at + 2) == Some(b"f ")
-        && text.get(at..at + 2) == Some(b"f ")
+        && is_face(known, known_at)
+        && is_face(text, at)
     {
         let before = normals.len();
         let Some((length, is_same)) =
@@ -228,10 +232,7 @@ fn normals_of(
         let line_end = window.of(b'\n');
         let line_end = line_end & line_end.wrapping_neg();
         let ends = (window.of(b' ') & through(line_end)) | line_end;
-        if ends == 0 {
-            return None;
-        }
-        let last = 63 - ends.leading_zeros();
+        let last = ends.checked_ilog2()?;
         let whole = u64::MAX >> (63 - last);
         let marks = window.others() & whole;
         let seconds = _pdep_u64(SECOND, marks);
@@ -272,6 +273,177 @@ fn normals_of(
         length += last as usize + 1;
         if left == 0 {
             return Some((length, is_same));
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::face::corner;
+    use super::*;
+    use proptest::prelude::*;
+
+    /// The corners of a line, read one by one; None where it is not of the usual form.
+    fn corners(line: &str) -> Option<Vec<[u32; 3]>> {
+        let words: Vec<&str> = line.split(' ').filter(|word| !word.is_empty()).collect();
+        let read = words.iter().map(|word| {
+            let (c, end) = corner(word.as_bytes(), 0, [0; 3]);
+            (end == word.len()).then_some([c.position, c.texcoord, c.normal])
+        });
+        read.collect()
+    }
+
+    /// Whether lines are of the usual form, in which they are read as one by one.
+    fn is_usual(lines: &[&str]) -> bool {
+        let text = format!("f {}\n#{}", lines.join("\nf "), " ".repeat(BYTES));
+        let mut list = FaceList::default();
+        let Some(end) = faces(text.as_bytes(), 0, &mut list) else { return false };
+        let count = list.counts.len();
+        let expected: Vec<Vec<[u32; 3]>> =
+            lines[..count].iter().map(|line| corners(line).unwrap_or_else(|| panic!("{line:?}"))).collect();
+        assert_eq!(end, lines[..count].iter().map(|line| line.len() + 3).sum::<usize>(), "{lines:?}");
+        let counts: Vec<u32> = expected.iter().map(|face| face.len() as u32).collect();
+        assert_eq!(list.counts, counts, "{lines:?}");
+        assert!(counts.iter().all(|&count| count >= 3));
+        let all: Vec<[u32; 3]> = expected.concat();
+        for (k, list) in [&list.positions, &list.texcoords, &list.normals].into_iter().enumerate() {
+            let of_corner = |i: usize| list.get(i).copied().unwrap_or(ABSENT);
+            let read: Vec<u32> = (0..all.len()).map(of_corner).collect();
+            assert_eq!(read, all.iter().map(|corner| corner[k]).collect::<Vec<u32>>(), "{lines:?}");
+            assert!(list.is_empty() || list.len() == all.len());
+        }
+        count == lines.len()
+    }
+
+    #[test]
+    fn forms() {
+        if !wide::is_there() {
+            return;
+        }
+        for line in [
+            "1 2 3",
+            "1 2 3 ",
+            "1/2 3/4 5/6 7/8",
+            "1//2 3//4 5//6",
+            "1234567/1234567/1234567 1234567/1234567/1234567 1234567/1234567/1234567 1234567/1234567/1234567",
+            "0/0/0 0/0/0 0000001/2/3",
+            "1 2 3 4 5 6 7 8 9 10 11 12 13 14 15 16 17 18 19 20 21 22 23 24 25 26 27 28 29 30 31 32 33 34 35 36",
+        ] {
+            assert!(
+                is_usual(&[line]) && is_usual(&[line, line]) && is_usual(&["7 8 9", line, "1//2 1//2 3//4"]),
+                "{line}"
+            );
+        }
+        for line in [
+            "",
+            "1",
+            "1 2",
+            "1 2  3",
+            " 1 2 3",
+            "1 2 3  ",
+            "1/ 2/ 3/",
+            "/1 /2 /3",
+            "1/2/3 4/5 6",
+            "1//2 3/4/5 6//7",
+            "1///2 3///4 5///6",
+            "1/2/3/4 1/2/3/4 1/2/3/4",
+            "-1 2 3",
+            "1 2 3 # so",
+            "1\t2 3",
+            "12345678 2 3",
+            "1/2/ 3/4/ 5/6/",
+            "1// 2// 3//",
+            "1 2 3\r",
+            "1 2 3 \r",
+            "1.5 2 3",
+            "1/2/3 4/5/6 7/8/9/",
+        ] {
+            assert!(!is_usual(&[line]), "{line}");
+        }
+        let mut list = FaceList::default();
+        assert_eq!(faces(b"f 1 2 3\n", 0, &mut list), None, "near the end of the text");
+    }
+
+    /// Whether the normals' indices of a line are read by those of the line before, in which they are those read one by
+    /// one, and nothing else differs.
+    fn is_similar(known: &str, line: &str, count: usize) -> bool {
+        let text = |line: &str| format!("f {line}\n#{}", " ".repeat(BYTES));
+        let mut normals = Vec::new();
+        let (a, b) = (text(known), text(line));
+        let Some(found) = similar((a.as_bytes(), 0), (b.as_bytes(), 0), &[count as u32], &mut normals) else {
+            return false;
+        };
+        if found.faces == 0 {
+            assert!(normals.is_empty() && found.end == 0 && found.known_end == 0);
+            return false;
+        }
+        assert_eq!((found.faces, found.end, found.known_end), (1, line.len() + 3, known.len() + 3));
+        let (known, read) = (corners(known).unwrap(), corners(line).unwrap());
+        let of = |corners: &[[u32; 3]], k: usize| corners.iter().map(|c| c[k]).collect::<Vec<u32>>();
+        assert_eq!((of(&known, 0), of(&known, 1)), (of(&read, 0), of(&read, 1)), "{line:?}");
+        assert_eq!((of(&read, 2), read.len()), (normals, count), "{line:?}");
+        assert!(!of(&read, 2).contains(&MISSING));
+        true
+    }
+
+    #[test]
+    fn only_digits_of_normals_may_differ() {
+        if !wide::is_there() {
+            return;
+        }
+        let known = "1/2/3 4/5/6 7/8/9";
+        for (line, is) in [
+            (known, true),
+            ("1/2/9 4/5/8 7/8/7", true),
+            ("1/2/9 4/5/8 7/8/70", false),
+            ("1/2/0 4/5/8 7/8/7", false),
+            ("1/3/3 4/5/6 7/8/9", false),
+            ("2/2/3 4/5/6 7/8/9", false),
+            ("1/2/345/5/6 7/8/9", false),
+            ("1/2/3 4/5/6 7/8 9", false),
+            ("1/2/3 4/5/6 7/8/-", false),
+        ] {
+            assert_eq!(is_similar(known, line, 3), is, "{line}");
+        }
+        assert!(!is_similar(known, known, 2) && !is_similar(known, known, 4));
+        assert!(is_similar("1//3 4//6 7//9", "1//4 4//4 7//4", 3));
+        let long =
+            "1234567/1234567/1234567 1234567/1234567/1234567 1234567/1234567/1234567 1234567/1234567/1234567";
+        assert!(is_similar(long, &long.replace("67 ", "77 "), 4));
+        assert!(!is_similar("1 2 3", "1 2 3", 3) && !is_similar("1/2 2/3 3/4", "1/2 2/3 3/4", 3));
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(20_000))]
+
+        #[test]
+        fn indices_are_those_of_single_corners(
+            a in r"([0-9]{1,7}/[0-9]{1,7}/[0-9]{1,7} ){1,5}[0-9]{1,3}/[0-9]{1,3}/[0-9]{1,8}",
+            b in r"([0-9]{1,7}//[0-9]{1,5} ){1,5}[0-9]{1,3}/?/[0-9]{1,3}",
+            c in r"([0-9]{1,7} ){1,20}([0-9]/[0-9])?",
+        ) {
+            is_usual(&[&a, &b, &c]);
+            is_usual(&[&c, &a, &c, &b]);
+        }
+
+        #[test]
+        fn other_bytes(line in r"[0-9]{1,3}[-0-9/ #]{0,90}") {
+            is_usual(&[&line]);
+        }
+
+        #[test]
+        fn similar_lines(
+            line in r"([0-9]{1,5}/[0-9]{0,5}/[0-9]{1,5} ){2,4}[0-9]/[0-9]/[0-9]",
+            edits in prop::collection::vec((0usize..90, "[-0-9/ ]"), 0..4),
+            count in 3usize..6,
+        ) {
+            let mut edited = line.clone();
+            for (at, byte) in edits {
+                let at = at % line.len();
+                edited.replace_range(at..=at, &byte);
+            }
+            is_similar(&line, &edited, count);
+            is_similar(&edited, &line, count);
         }
     }
 }
