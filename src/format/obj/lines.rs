@@ -92,7 +92,7 @@ fn face(text: &[u8], start: usize, faces: &mut FaceList) -> Option<usize> {
             return None;
         }
         let values = values(bytes, marks);
-        let values = &values[..marks.count_ones() as usize];
+        let values = &values.as_flattened()[..marks.count_ones() as usize];
         match (indices, is_without_texcoords) {
             (1, _) => faces.corners_of::<1, false, false>(values),
             (2, _) => faces.corners_of::<2, true, false>(values),
@@ -106,11 +106,14 @@ fn face(text: &[u8], start: usize, faces: &mut FaceList) -> Option<usize> {
     }
 }
 
+/// Most marks in a window, in fours: three for each five bytes of `1//1 `.
+const FOURS: usize = (WINDOW * 3 / 5).div_ceil(4);
+
 /// The numbers before each mark, less one; what stands behind the last is undefined.
 #[inline]
 #[target_feature(enable = "avx2,bmi1,bmi2")]
-fn values(bytes: &[u8; BYTES], mut marks: u64) -> [u32; 32] {
-    let mut values = [[0; 4]; 8];
+fn values(bytes: &[u8; BYTES], mut marks: u64) -> [[u32; 4]; FOURS] {
+    let mut values = [[0; 4]; FOURS];
     let mut start = 0;
     for four in &mut values {
         let words = [(); 4].map(|()| {
@@ -125,7 +128,7 @@ fn values(bytes: &[u8; BYTES], mut marks: u64) -> [u32; 32] {
             break;
         }
     }
-    bytemuck::cast(values)
+    values
 }
 
 /// Digits from one place to another, at most eight, the last in the highest byte.
@@ -150,6 +153,9 @@ impl FaceList {
             [(&mut self.texcoords, TEXCOORDS, 1), (&mut self.normals, NORMALS, INDICES - 1)]
         {
             if is_there {
+                if list.is_empty() {
+                    list.reserve(self.positions.capacity());
+                }
                 if list.len() < before {
                     list.resize(before, ABSENT);
                 }
@@ -323,6 +329,7 @@ mod tests {
         for line in [
             "1 2 3",
             "1 2 3 ",
+            "1//1 2//2 3//3 4//4 5//5 6//6 7//7 8//8 9//9 1//1 2//2 3//3 4//4 5//5 6//6 7//7 8//8 9//9 1//1",
             "1/2 3/4 5/6 7/8",
             "1//2 3//4 5//6",
             "1234567/1234567/1234567 1234567/1234567/1234567 1234567/1234567/1234567 1234567/1234567/1234567",
@@ -420,10 +427,11 @@ mod tests {
         fn indices_are_those_of_single_corners(
             a in r"([0-9]{1,7}/[0-9]{1,7}/[0-9]{1,7} ){1,5}[0-9]{1,3}/[0-9]{1,3}/[0-9]{1,8}",
             b in r"([0-9]{1,7}//[0-9]{1,5} ){1,5}[0-9]{1,3}/?/[0-9]{1,3}",
+            d in r"([0-9]{1,2}//[0-9] ){8,20}[0-9]//[0-9]",
             c in r"([0-9]{1,7} ){1,20}([0-9]/[0-9])?",
         ) {
             is_usual(&[&a, &b, &c]);
-            is_usual(&[&c, &a, &c, &b]);
+            is_usual(&[&c, &d, &a, &c, &d, &b]);
         }
 
         #[test]
