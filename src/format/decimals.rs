@@ -64,10 +64,6 @@ fn rows_wide<const N: usize>(
 ) -> Option<usize> {
     let mut end = None;
     let mut at = start;
-    if list.is_empty() {
-        // as many as there may well be
-        list.reserve((text.len() - start) / 64);
-    }
     // compared as a number, which is no call
     let mut padded = [0; 4];
     padded[..word.len()].copy_from_slice(word);

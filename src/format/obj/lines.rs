@@ -153,9 +153,6 @@ impl FaceList {
             [(&mut self.texcoords, TEXCOORDS, 1), (&mut self.normals, NORMALS, INDICES - 1)]
         {
             if is_there {
-                if list.is_empty() {
-                    list.reserve(self.positions.capacity());
-                }
                 if list.len() < before {
                     list.resize(before, ABSENT);
                 }
