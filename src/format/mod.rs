@@ -1,5 +1,7 @@
 //! Bytes to values with diagnostics: OBJ, MTL, glTF and textures. The only room that reads scenes.
 
+#[cfg(target_arch = "x86_64")]
+mod decimals;
 mod error;
 mod gltf;
 mod library;
@@ -11,6 +13,8 @@ mod obj;
 mod text;
 mod texture;
 mod triple;
+#[cfg(target_arch = "x86_64")]
+mod wide;
 
 use crate::clock::Stopwatch;
 use crate::math::Bounds;

@@ -12,11 +12,15 @@ const POWERS: [f64; 23] = [
 pub(super) const INTEGER_POWERS: [u64; 9] =
     [1, 10, 100, 1_000, 10_000, 100_000, 1_000_000, 10_000_000, 100_000_000];
 
-/// The nearest f64 to their inverses, as far.
-pub(super) const INVERSE_POWERS: [f64; 9] = [1e0, 1e-1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8];
+/// The nearest f64 to inverses of powers of ten, as far as digits are exact.
+pub(super) const INVERSE_POWERS: [f64; 16] =
+    [1e0, 1e-1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10, 1e-11, 1e-12, 1e-13, 1e-14, 1e-15];
 
-/// Digits that surely fit a `u64`.
-const MAX_DIGITS: usize = 18;
+/// The bits of an f64 behind those of an f32, and what they are halfway between two f32.
+pub(super) const BEHIND_F32: u64 = 0x1FFF_FFFF;
+pub(super) const HALFWAY: u64 = 0x1000_0000;
+/// How near to that an f64 of 2 units' error in the last place must not come, in such units.
+pub(super) const NEAR_HALFWAY: u64 = 4;
 
 /// The byte at `at`; a line ends where the text ends.
 #[inline]
@@ -121,7 +125,7 @@ fn short_decimal(text: &[u8], start: usize) -> Option<(f32, usize)> {
 #[inline(always)]
 #[allow(clippy::inline_always, reason = "as in `triple`")]
 pub(super) fn near_halfway(value: f64) -> bool {
-    (value.to_bits() & 0x1FFF_FFFF).abs_diff(0x1000_0000) <= 4
+    (value.to_bits() & BEHIND_F32).abs_diff(HALFWAY) <= NEAR_HALFWAY
 }
 
 /// All that [`short_decimal`] leaves.
@@ -150,17 +154,14 @@ fn plain_decimal(text: &[u8], start: usize) -> Option<(f32, usize)> {
             let (value, n) = digits(text, at);
             decimals += n;
             at += n;
-            if count + decimals > MAX_DIGITS {
-                return None;
-            }
-            mantissa = mantissa * INTEGER_POWERS[n] + value;
+            mantissa = mantissa.checked_mul(INTEGER_POWERS[n])?.checked_add(value)?;
             if n < 8 {
                 break;
             }
         }
         count += decimals;
     }
-    if count == 0 || mantissa >= 1 << 53 {
+    if count == 0 {
         return None;
     }
     let mut exponent = -(decimals as i32);
@@ -180,7 +181,12 @@ fn plain_decimal(text: &[u8], start: usize) -> Option<(f32, usize)> {
     }
     let power = *POWERS.get(exponent.unsigned_abs() as usize)?;
     let value = mantissa as f64;
-    let value = rounded(if exponent < 0 { value / power } else { value * power })?;
+    let value = if exponent < 0 { value / power } else { value * power };
+    // more digits than are exact cost another unit in the last place
+    if mantissa >= 1 << 53 && near_halfway(value) {
+        return None;
+    }
+    let value = rounded(value)?;
     Some((if sign == b'-' { -value } else { value }, at))
 }
 
@@ -194,7 +200,7 @@ fn rounded(value: f64) -> Option<f32> {
 /// Whether an f64 lies halfway between two f32: its last 29 bits are 100…0. Rounding twice errs only there.
 #[inline]
 fn is_halfway(value: f64) -> bool {
-    value.to_bits() & 0x1FFF_FFFF == 0x1000_0000
+    value.to_bits() & BEHIND_F32 == HALFWAY
 }
 
 /// Everything else: many digits, large exponents, `inf`, `nan`, and what is no number.

@@ -5,7 +5,11 @@
 // A part that is not inlined is a call for each number, and is compiled for the least of processors.
 #![allow(clippy::inline_always)]
 
+#[cfg(target_arch = "x86_64")]
+use super::decimals;
 use super::number::{INTEGER_POWERS, INVERSE_POWERS, eight_digits, near_halfway};
+#[cfg(target_arch = "x86_64")]
+use super::wide;
 
 /// Bytes in which the numbers must stand, with what ends them.
 const WINDOW: usize = 48;
@@ -23,25 +27,19 @@ pub(super) fn triples<const NORMALS: bool>(
     list: &mut Vec<[f32; 3]>,
 ) -> Option<usize> {
     #[cfg(target_arch = "x86_64")]
-    if is_x86_feature_detected!("avx2")
-        && is_x86_feature_detected!("bmi1")
-        && is_x86_feature_detected!("bmi2")
-    {
-        // SAFETY: the processor has what is needed.
-        return unsafe { triples_with_bmi::<NORMALS>(text, start, list) };
+    if wide::is_there() {
+        return decimals::rows(text, start, if NORMALS { b"vn " } else { b"v " }, list);
     }
     triples_of::<NORMALS>(text, start, list)
 }
 
-/// The same operations with fewer instructions.
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx2,bmi1,bmi2")]
-fn triples_with_bmi<const NORMALS: bool>(
-    text: &[u8],
-    start: usize,
-    list: &mut Vec<[f32; 3]>,
-) -> Option<usize> {
-    triples_of::<NORMALS>(text, start, list)
+/// Reads lines of `vt` with two plain decimals, as [`triples`] does.
+#[inline]
+pub(super) fn pairs(text: &[u8], start: usize, list: &mut Vec<[f32; 2]>) -> Option<usize> {
+    #[cfg(target_arch = "x86_64")]
+    return decimals::rows(text, start, b"vt ", list);
+    #[cfg(not(target_arch = "x86_64"))]
+    None
 }
 
 #[inline(always)]

@@ -152,7 +152,9 @@ impl Again<'_, '_> {
             self.same_faces(faces)?;
             self.faces.at += same;
             at + same
-        } else if may_be_same && let Some(end) = self.similar_faces(at, run.end) {
+        } else if may_be_same && let Some(end) = self.usual_faces(at, run.end) {
+            end
+        } else if may_be_same && let Some(end) = self.similar_face(at, run.end) {
             end
         } else {
             let end = self.face(at, so_far)?;
@@ -193,30 +195,43 @@ impl Again<'_, '_> {
         Some(())
     }
 
-    /// Reads faces whose lines differ in nothing but normals, up to one that is the same in those too or to the end of
-    /// the run.
-    fn similar_faces(&mut self, start: usize, run_end: usize) -> Option<usize> {
-        let counts = &self.before.geometry.faces.counts[..];
-        let known = &self.before.bytes[..run_end];
+    /// Reads faces whose lines have their normals' indices in the same places and differ in nothing else, up to some
+    /// that are the same in those too or to the end of the run.
+    #[cfg(target_arch = "x86_64")]
+    fn usual_faces(&mut self, start: usize, run_end: usize) -> Option<usize> {
+        let counts = self.before.geometry.faces.counts.get(self.scan.face_count as usize..)?;
+        let known = (&self.before.bytes[..run_end], self.faces.at);
         let list = &mut self.scan.faces.normals;
         list.resize(self.corners, ABSENT);
-        let (mut face, mut known_at, mut at) = (self.scan.face_count as usize, self.faces.at, start);
-        self.was_same = false;
-        while !self.was_same
-            && let Some(&count) = counts.get(face)
-            && known.get(known_at..).is_some_and(|line| line.starts_with(b"f "))
-            && self.text.get(at..).is_some_and(|line| line.starts_with(b"f "))
-            && let Some((known_end, end, is_same)) =
-                same_but_normals((known, known_at + 2), (self.text, at + 2), count as usize, list)
-        {
-            self.was_same = is_same;
-            (known_at, at) = (known_end, end);
-            face += 1;
-        }
+        let similar = super::lines::similar(known, (self.text, start), counts, list)?;
         self.corners = list.len();
-        self.scan.face_count = face as u32;
-        self.faces.at = known_at;
-        (at > start).then_some(at)
+        self.scan.face_count += similar.faces as u32;
+        self.faces.at = similar.known_end;
+        self.was_same = true;
+        (similar.faces > 0).then_some(similar.end)
+    }
+
+    #[cfg(not(target_arch = "x86_64"))]
+    fn usual_faces(&mut self, _: usize, _: usize) -> Option<usize> {
+        None
+    }
+
+    /// Reads a face whose line differs in nothing but normals.
+    fn similar_face(&mut self, start: usize, run_end: usize) -> Option<usize> {
+        let count = *self.before.geometry.faces.counts.get(self.scan.face_count as usize)? as usize;
+        let (known, known_at) = (&self.before.bytes[..run_end], self.faces.at);
+        let list = &mut self.scan.faces.normals;
+        if !known[known_at..].starts_with(b"f ") {
+            return None;
+        }
+        list.resize(self.corners, ABSENT);
+        let (known_end, end, is_same) =
+            same_but_normals((known, known_at + 2), (self.text, start + 2), count, list)?;
+        self.corners = list.len();
+        self.scan.face_count += 1;
+        self.faces.at = known_end;
+        self.was_same = is_same;
+        Some(end)
     }
 
     /// Reads one face.

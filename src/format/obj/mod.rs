@@ -1,12 +1,14 @@
 //! Wavefront OBJ: vertices, polygons, smoothing groups, colours, and which face has which material.
 //!
-//! The bytes are scanned once into lists ([`scan`]), what faces name is checked ([`check`]), polygons become
-//! triangles ([`triangulate`]), and the lists become parts ([`mesh`]). A frame that has the faces of the one before it
-//! is read with that at hand ([`again`]).
+//! The bytes are scanned once into lists ([`scan`]; faces as most are written by `lines`), what faces name is checked
+//! ([`check`]), polygons become triangles ([`triangulate`]), and the lists become parts ([`mesh`]). A frame that has the
+//! faces of the one before it is read with that at hand ([`again`]).
 
 mod again;
 mod check;
 mod face;
+#[cfg(target_arch = "x86_64")]
+mod lines;
 mod mesh;
 mod scan;
 pub(super) mod stored;

@@ -6,7 +6,7 @@ use crate::format::number::{byte, float};
 use crate::format::text::{
     Tally, first_word, is_blank, is_line_end, line_end, trimmed, without_comment, words,
 };
-use crate::format::triple::triples;
+use crate::format::triple::{pairs, triples};
 use crate::scene::ABSENT;
 use memchr::memchr;
 
@@ -171,7 +171,9 @@ impl<'a> Scan<'a> {
         match (byte(text, start), byte(text, start + 1)) {
             (b'v', b' ') if let Some(end) = triples::<false>(text, start, &mut self.positions) => end,
             (b'v', next) if ends_word(next) => self.position(text, start),
+            (b'f', b' ') if let Some(end) = self.usual_faces(text, start) => end,
             (b'f', next) if ends_word(next) => self.face(text, start),
+            (b'v', b't') if let Some(end) = self.usual_texcoords(text, start) => end,
             (b'v', b't') if ends_word(byte(text, start + 2)) => {
                 let (values, at, malformed) = numbers::<1>(text, start + 2);
                 let (second, at) = optional(text, at);
@@ -256,6 +258,30 @@ impl<'a> Scan<'a> {
         after_line(text, at)
     }
 
+    /// Texture coordinates that stand one below the other, written the usual way.
+    #[inline]
+    fn usual_texcoords(&mut self, text: &[u8], start: usize) -> Option<usize> {
+        let so_far = self.so_far();
+        let end = pairs(text, start, &mut self.texcoords)?;
+        self.note_run(text, Run { kind: Kind::Texcoords, start, end, so_far });
+        Some(end)
+    }
+
+    /// Faces that stand one below the other, written the usual way.
+    #[inline]
+    #[cfg(target_arch = "x86_64")]
+    fn usual_faces(&mut self, text: &[u8], start: usize) -> Option<usize> {
+        let end = super::lines::faces(text, start, &mut self.faces)?;
+        self.face_count = self.faces.counts.len() as u32;
+        self.note_run(text, Run { kind: Kind::Faces, start, end, so_far: self.so_far() });
+        Some(end)
+    }
+
+    #[cfg(not(target_arch = "x86_64"))]
+    fn usual_faces(&mut self, _: &[u8], _: usize) -> Option<usize> {
+        None
+    }
+
     #[inline]
     fn face(&mut self, text: &[u8], start: usize) -> usize {
         let so_far = self.so_far();
@@ -313,7 +339,7 @@ impl FaceList {
         push_attribute(&mut self.normals, before, corner.normal);
     }
 
-    fn truncate(&mut self, corners: usize) {
+    pub(super) fn truncate(&mut self, corners: usize) {
         self.positions.truncate(corners);
         self.texcoords.truncate(corners);
         self.normals.truncate(corners);

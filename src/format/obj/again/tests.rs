@@ -116,7 +116,8 @@ fn exported() -> String {
     for (a, n) in [(1, 1), (2, 2), (3, 2), (5, 3), (6, 5), (7, 4)] {
         let _ = writeln!(text, "f {a}/{a}/{n} {0}/{0}/{n} {1}/{1}/{n} {2}/{2}/{n}", a + 1, a + 5, a + 4);
     }
-    text
+    // near the end of a text lines are read otherwise
+    text + "# " + &"-".repeat(80) + "\n"
 }
 
 /// Splitmix64 (Steele et al. 2014).
