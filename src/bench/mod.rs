@@ -39,6 +39,8 @@ pub struct BenchOptions {
     pub embree: Option<PathBuf>,
     /// Fewer runs, smaller made scenes.
     pub quick: bool,
+    /// The tables to make, by name; all where none is named.
+    pub only: Vec<String>,
     /// Threads.
     pub threads: usize,
 }
@@ -52,12 +54,15 @@ pub struct Workload {
     pub name: &'static str,
     /// What it measures.
     pub about: &'static str,
+    /// The names of its tables.
+    pub tables: &'static [&'static str],
     run: Run,
 }
 
 /// All of them.
 pub const WORKLOADS: [Workload; 1] = [Workload {
     name: "updates",
+    tables: &["reading", "trees", "warm", "start", "policy"],
     about: "what a frame costs that follows another: reading, trees, refit or rebuild, the store",
     run: updates::updates,
 }];
@@ -122,6 +127,10 @@ impl Bench {
     /// How often something is measured that deserves so many times.
     fn rounds(&self, rounds: usize) -> usize {
         if self.options.quick { rounds.div_ceil(4) } else { rounds }
+    }
+
+    fn wants(&self, table: &str) -> bool {
+        self.options.only.is_empty() || self.options.only.iter().any(|name| name == table)
     }
 
     /// A file of the scenes, where it is there.

@@ -59,9 +59,12 @@ pub(super) fn trees(bench: &Bench, meshes: &[Mesh]) -> Table {
         let poses = [positions.clone(), moved(positions)];
         let mut tree = Tree::build(positions, triangles, Quality::default());
         let mut turn = 0;
-        let [build, refit] = in_turn(
-            bench.rounds(15),
-            [&mut || drop(Tree::build(positions, triangles, Quality::default())), &mut || {
+        let [build] =
+            in_turn(bench.rounds(9), [&mut || drop(Tree::build(positions, triangles, Quality::default()))]);
+        // over and over, as the peer does
+        let [refit] = in_turn(
+            bench.rounds(100),
+            [&mut || {
                 turn ^= 1;
                 tree.refit(&poses[turn], triangles);
             }],

@@ -36,46 +36,52 @@ const WAVE_FRAMES: u32 = 12;
 /// Runs it.
 pub(super) fn updates(bench: &Bench, on_event: &mut dyn FnMut(&Event<'_>)) -> Result<Findings, BenchError> {
     let mut findings = Findings::default();
+    on_event(&Event::Stage("making sequences"));
     let hostile = hostile(bench)?;
-    on_event(&Event::Stage("reading meshes, making waves"));
-    let meshes = meshes(bench, &hostile)?;
     let waves = waves(bench, &hostile)?;
-    on_event(&Event::Stage("reading"));
-    let mut read: Vec<Consecutive> = Vec::new();
-    for (name, folder) in waves.iter().chain(&sequences(bench)) {
-        read.push(Consecutive::of(name, &obj_files(folder)));
+    if bench.wants("reading") {
+        on_event(&Event::Stage("reading"));
+        let all: Vec<_> = waves.iter().cloned().chain(sequences(bench)).collect();
+        let read: Vec<_> =
+            all.iter().map(|(name, folder)| Consecutive::of(name, &obj_files(folder))).collect();
+        findings.add(reading(bench, &read), on_event);
     }
-    findings.add(reading(bench, &read), on_event);
-    on_event(&Event::Stage("trees"));
-    findings.add(trees(bench, &meshes), on_event);
-
-    on_event(&Event::Stage("warm frames"));
-    let rates = &findings.tables[0];
-    let rate =
-        |name: &str| rates.rows.iter().find(|(row, _)| row == name).and_then(|(_, cells)| cells[4].value());
-    let refit_ms = |name: &str| {
-        let mesh = meshes.iter().find(|mesh| name.starts_with(&mesh.name))?;
-        mesh.embree.as_ref()?.refit_one_thread_ms
-    };
-    let with_peers: Vec<_> = waves
-        .iter()
-        .map(|(name, folder)| {
-            (name.clone(), &**folder, WarmPeers { reading: rate(name), embree_refit_ms: refit_ms(name) })
-        })
-        .collect();
-    findings.add(warm_frames(bench, &with_peers)?, on_event);
-
-    if let Some(sibenik) = bench.scene("sibenik/sibenik.obj") {
+    let mut meshes = Vec::new();
+    if bench.wants("trees") {
+        on_event(&Event::Stage("trees"));
+        meshes = self::meshes(bench, &hostile)?;
+        findings.add(trees(bench, &meshes), on_event);
+    }
+    if bench.wants("warm") {
+        on_event(&Event::Stage("warm frames"));
+        let rows =
+            findings.tables.iter().filter(|table| table.name == "reading").flat_map(|table| &table.rows);
+        let peers = |name: &str| WarmPeers {
+            reading: rows.clone().find(|(row, _)| row == name).and_then(|(_, cells)| cells[4].value()),
+            embree_refit_ms: meshes
+                .iter()
+                .find(|mesh| name.starts_with(&mesh.name))
+                .and_then(|mesh| mesh.embree.as_ref()?.refit_one_thread_ms),
+        };
+        let with_peers: Vec<_> =
+            waves.iter().map(|(name, folder)| (name.clone(), &**folder, peers(name))).collect();
+        findings.add(warm_frames(bench, &with_peers)?, on_event);
+    }
+    if bench.wants("start")
+        && let Some(sibenik) = bench.scene("sibenik/sibenik.obj")
+    {
         on_event(&Event::Stage("start"));
         findings.add(starts(bench, &[("sibenik", &sibenik, SIBENIK)])?, on_event);
     }
-    on_event(&Event::Stage("refit or rebuild"));
-    let input = |is_charted| move |(name, folder): (String, PathBuf)| Input { name, folder, is_charted };
-    let mut inputs: Vec<Input> = hostile.into_iter().map(input(true)).collect();
-    inputs.extend(waves.into_iter().chain(sequences(bench)).map(input(false)));
-    let (table, charts) = policy(bench, &inputs)?;
-    findings.add(table, on_event);
-    findings.charts.extend(charts);
+    if bench.wants("policy") {
+        on_event(&Event::Stage("refit or rebuild"));
+        let input = |is_charted| move |(name, folder)| Input { name, folder, is_charted };
+        let mut inputs: Vec<Input> = hostile.into_iter().map(input(true)).collect();
+        inputs.extend(waves.into_iter().chain(sequences(bench)).map(input(false)));
+        let (table, charts) = policy(bench, &inputs)?;
+        findings.add(table, on_event);
+        findings.charts.extend(charts);
+    }
     Ok(findings)
 }
 

@@ -22,6 +22,9 @@ pub(super) struct BenchArgs {
     /// Fewer runs, smaller made scenes
     #[arg(long)]
     quick: bool,
+    /// This table alone (may be repeated)
+    #[arg(long, value_name = "TABLE", value_parser = WORKLOADS.iter().flat_map(|w| w.tables).copied().collect::<Vec<_>>())]
+    only: Vec<String>,
     /// A folder of scenes; without it made ones are taken [default: RENTIX_SCENES]
     #[arg(long, value_name = "DIR")]
     scenes: Option<PathBuf>,
@@ -41,6 +44,7 @@ pub(super) fn bench(args: &BenchArgs, global: &Global) -> Result<ExitCode> {
         scenes: args.scenes.clone().or_else(|| set("RENTIX_SCENES")),
         embree: args.embree.clone().or_else(|| set("RENTIX_EMBREE")),
         quick: args.quick,
+        only: args.only.clone(),
         threads: args.threads.map_or_else(|| machine::machine().cores, usize::from),
     };
     let is_asked = |w: &Workload| args.names.is_empty() || args.names.iter().any(|name| name == w.name);
