@@ -36,7 +36,7 @@ pub(super) fn policy(bench: &Bench, inputs: &[Input]) -> Result<(Table, Vec<Char
     for input in inputs {
         let mut ms: [Vec<f64>; 3] = Default::default();
         let mut last: [Vec<FrameReport>; 3] = Default::default();
-        for _ in 0..bench.rounds(5) {
+        for _ in 0..bench.rounds(3) {
             for (i, (_, update)) in UPDATES.iter().enumerate() {
                 last[i] = render(bench, input, *update)?;
                 ms[i].push(last[i].iter().map(update_and_trace_ms).sum());

@@ -29,8 +29,8 @@ const SIBENIK: View = View { eye: [-17.0, -13.0, 0.0], look_at: [0.0, -11.0, 0.0
 /// Meshes through which waves run, by their names among [`MESHES`].
 const WAVES: [&str; 3] = ["bunny", "dragon", "conference"];
 /// Side of the sheets of hostile sequences, their frames, and those of waves.
-const SIDE: u32 = 200;
-const FRAMES: u32 = 32;
+const SIDE: u32 = 100;
+const FRAMES: u32 = 24;
 const WAVE_FRAMES: u32 = 12;
 
 /// Runs it.
