@@ -135,8 +135,8 @@ fn values(bytes: &[u8; BYTES], mut marks: u64) -> [[u32; 4]; FOURS] {
 #[inline]
 fn digits(bytes: &[u8; BYTES], start: usize, end: usize) -> u64 {
     let word = bytes[start & 63..].first_chunk().copied().map_or(0, u64::from_le_bytes);
-    // in two steps: a shift by 64 is none
-    let half = 32usize.wrapping_sub(4 * end.wrapping_sub(start)) & 63;
+    // in two steps: a shift by 64 is none; behind the last mark the places mean nothing
+    let half = 32usize.wrapping_sub(end.wrapping_sub(start).wrapping_mul(4)) & 63;
     (word ^ 0x3030_3030_3030_3030) << half << half
 }
 
