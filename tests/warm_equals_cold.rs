@@ -3,26 +3,15 @@
 
 mod common;
 use common::{assert_same, pictures, render, report, run};
-use rentix::bench::sequences::{HOSTILE, Hostile};
-use std::fmt::Write as _;
+use rentix::bench::sequences::{HOSTILE, Hostile, Sheet};
 use std::path::{Path, PathBuf};
 
 const FRAMES: u32 = 8;
 const SIDE: u32 = 13;
 
-/// A sheet of SIDE² points in each frame, moved.
+/// The sheet in a frame, moved.
 fn moved(frame: u32, place: impl Fn(f64, [f64; 3]) -> [f64; 3]) -> String {
-    let t = f64::from(frame) / f64::from(FRAMES - 1);
-    let mut text = String::new();
-    for i in 0..SIDE * SIDE {
-        let [x, y] = [i % SIDE, i / SIDE].map(|k| 2.0 * f64::from(k) / f64::from(SIDE - 1) - 1.0);
-        let [x, y, z] = place(t, [x, y, 0.3 * (4.0 * x).sin() * (3.0 * y).cos()]);
-        let _ = writeln!(text, "v {x} {y} {z}");
-    }
-    for i in (0..SIDE * (SIDE - 1)).filter(|i| i % SIDE < SIDE - 1) {
-        let _ = writeln!(text, "f {} {} {} {}", i + 1, i + 2, i + SIDE + 2, i + SIDE + 1);
-    }
-    text
+    Sheet { side: SIDE, frames: FRAMES }.moved(frame, |t, p, _| place(t, p))
 }
 
 fn write(folder: &Path, hostile: &Hostile) -> PathBuf {

@@ -32,8 +32,8 @@ impl Tree {
     }
 
     /// Fits the tree as it stands to other positions, in the current rayon pool. Leaves whose corners stand still are left
-    /// alone, and nodes above nothing but such leaves; the tree is the one that a refit of all of it gives. Triangles that are made of other
-    /// corners are taken as they are now; their number must be that which the tree was built over.
+    /// alone, and nodes above nothing but such leaves; the tree is the one that a refit of all of it gives. Triangles
+    /// that are made of other corners are taken as they are now; their number must be that which the tree was built over.
     pub fn refit(&mut self, positions: &[[f32; 3]], triangles: &[[u32; 3]]) {
         self.refit_in(Width::detect(), positions, triangles);
     }

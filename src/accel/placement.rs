@@ -119,7 +119,7 @@ fn abs(m: &DMat3) -> DMat3 {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
     use crate::accel::slab::SlabRay;
     use crate::accel::triangle::ScalarRay;
@@ -127,7 +127,7 @@ mod tests {
     use glam::DQuat;
 
     /// Numbers in [-1, 1): the fractional parts of multiples of the golden ratio.
-    fn numbers() -> impl FnMut() -> f64 {
+    pub(crate) fn numbers() -> impl FnMut() -> f64 {
         let mut n = 0.0_f64;
         move || {
             n += 1.0;

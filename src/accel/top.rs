@@ -38,7 +38,8 @@ impl TopLevel {
             .map(f32::abs)
             .filter(|x| x.is_finite())
             .fold(0.0, f32::max);
-        let reach = farthest * REACH;
+        // finite: infinity times the zeros of a margin would be NaN, and such a box is never entered
+        let reach = (farthest * REACH).min(f32::MAX);
         let widest = ray_from(reach);
         let boxes = (0..objects).map(|i| (i as u32, box_for(i, &widest)));
         let mut boxes: Vec<(u32, Aabb)> = boxes.filter(|(_, b)| !b.is_empty()).collect();

@@ -7,7 +7,7 @@ use super::placement::Placement;
 use super::slab::{Aabb, SlabRay};
 use super::stack::Stack;
 use super::top::TopLevel;
-use super::traverse::{Found, nearest_child};
+use super::traverse::{Descent, Found};
 use super::tree::{LEAF, Tree, WIDTH};
 use super::triangle::Search;
 use super::{Aggregate, Hit, HitOrder, Ray};
@@ -105,30 +105,17 @@ impl TracedScene {
         ray: &Ray,
         search: &mut Search,
     ) -> Option<FoundIn> {
-        let slab = SlabRay::<L>::new(ray);
-        let mut stack = Stack::new();
-        let mut next = nearest_child(top.nodes.first()?, &slab, search.before.distance, &mut stack);
+        let mut descent = Descent::<L>::new(&top.nodes, ray);
         let mut found = None;
-        loop {
-            let child = match next {
-                Some(child) => child,
-                None => match stack.pop_before(search.before.distance) {
-                    Some(child) => child,
-                    None => return found,
-                },
-            };
-            if child & LEAF == 0 {
-                next = nearest_child(&top.nodes[child as usize], &slab, search.before.distance, &mut stack);
-                continue;
-            }
-            next = None;
-            if let Some(nearer) = self.search_object::<L, ANY>((child & !LEAF) as usize, ray, search) {
+        while let Some(object) = descent.next_leaf(search.before.distance) {
+            if let Some(nearer) = self.search_object::<L, ANY>(object, ray, search) {
                 found = Some(nearer);
                 if ANY {
-                    return found;
+                    break;
                 }
             }
         }
+        found
     }
 
     #[inline(always)]
@@ -365,17 +352,9 @@ impl Aggregate for TracedScene {
 mod tests {
     use super::*;
     use crate::accel::Quality;
+    use crate::accel::placement::tests::numbers;
     use crate::math::{DVec3, Vec3};
     use glam::DQuat;
-
-    /// Numbers in [-1, 1): the fractional parts of multiples of the golden ratio.
-    fn numbers() -> impl FnMut() -> f64 {
-        let mut n = 0.0_f64;
-        move || {
-            n += 1.0;
-            2.0 * (n * 0.618_033_988_749_894_9).fract() - 1.0
-        }
-    }
 
     /// Fans of triangles all over the place; some stand as they are, one can never be hit, some lie in one another.
     fn objects(count: usize) -> Vec<TracedObject> {
@@ -436,5 +415,22 @@ mod tests {
             }
             assert!(seen > 100, "{count}: {seen}");
         }
+    }
+
+    /// One stray object may stand so far away that a box for all rays that start as far would be infinite.
+    #[test]
+    fn an_object_at_the_end_of_the_world_hides_no_others() {
+        let points = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
+        let tree = Arc::new(Tree::build(&points, &[[0, 1, 2]], Quality::default()));
+        let at = |z: f64| Some(DAffine3::from_translation(DVec3::new(0.0, 0.0, z)));
+        let object = |z: f64| TracedObject::new(Arc::clone(&tree), at(z).as_ref());
+        let scene = TracedScene::new([1e37, 1.0, 2.0, 3.0, 4.0, 5.0].map(object).to_vec());
+        assert!(scene.top.is_some());
+        let ray = Ray { origin: Vec3::new(0.2, 0.3, -1.0), direction: Vec3::Z };
+        let hit = scene.closest(&ray, None);
+        assert_eq!(hit.map(|hit| (hit.object, hit.distance)), Some((1, 2.0)));
+        let mut hits = [None; RAYS];
+        scene.closest_batch(&[ray; RAYS], &mut hits);
+        assert_eq!(hits, [hit; RAYS]);
     }
 }

@@ -17,6 +17,48 @@ pub(crate) struct Found {
     pub(crate) barycentric: [f32; 2],
 }
 
+/// A ray's way down through nodes: leaf after leaf, those that it enters first before the others.
+pub(crate) struct Descent<'a, L> {
+    nodes: &'a [Node],
+    slab: SlabRay<L>,
+    stack: Stack,
+    /// Whether the root is still to be looked at.
+    is_new: bool,
+}
+
+impl<'a, L: Lanes8> Descent<'a, L> {
+    #[inline(always)]
+    pub(crate) fn new(nodes: &'a [Node], ray: &Ray) -> Self {
+        Self { nodes, slab: SlabRay::new(ray), stack: Stack::new(), is_new: true }
+    }
+
+    /// The next leaf that is entered not after a distance.
+    #[inline(always)]
+    pub(crate) fn next_leaf(&mut self, distance: f32) -> Option<usize> {
+        let mut node = if self.is_new {
+            self.is_new = false;
+            0
+        } else {
+            let child = self.stack.pop_before(distance)?;
+            if child & LEAF != 0 {
+                return Some((child & !LEAF) as usize);
+            }
+            child
+        };
+        loop {
+            let child =
+                match nearest_child(self.nodes.get(node as usize)?, &self.slab, distance, &mut self.stack) {
+                    Some(child) => child,
+                    None => self.stack.pop_before(distance)?,
+                };
+            if child & LEAF != 0 {
+                return Some((child & !LEAF) as usize);
+            }
+            node = child;
+        }
+    }
+}
+
 impl Tree {
     /// Looks for a candidate; `first` is the primitive number of the tree's triangle 0. With ANY the first one found
     /// ends the search, else `search` ends before the first in the order, which is returned.
@@ -27,46 +69,31 @@ impl Tree {
         first: u32,
         search: &mut Search,
     ) -> Option<Found> {
-        let slab = SlabRay::<L>::new(ray);
-        let mut stack = Stack::new();
-        let mut next = nearest_child(self.nodes.first()?, &slab, search.before.distance, &mut stack);
+        let mut descent = Descent::<L>::new(&self.nodes, ray);
         // most rays of many a picture end here
-        next?;
+        let mut leaf = descent.next_leaf(search.before.distance)?;
         let scalar_slab = SlabRay::new(ray);
         let shear = ShearRay::<L>::new(ray);
         let mut found = None;
         loop {
-            let child = match next {
-                Some(child) => child,
-                None => match stack.pop_before(search.before.distance) {
-                    Some(child) => child,
-                    None => return found,
-                },
-            };
-            if child & LEAF == 0 {
-                next = nearest_child(&self.nodes[child as usize], &slab, search.before.distance, &mut stack);
-                continue;
-            }
-            let block = &self.blocks[(child & !LEAF) as usize];
+            let block = &self.blocks[leaf];
             if let Some(nearer) = search_block::<L, ANY>(block, &shear, || scalar_slab, first, search) {
                 found = Some(nearer);
                 if ANY {
                     return found;
                 }
             }
-            next = None;
+            match descent.next_leaf(search.before.distance) {
+                Some(next) => leaf = next,
+                None => return found,
+            }
         }
     }
 }
 
 /// The child that a ray enters first of those that it enters not after a distance; the others wait.
 #[inline(always)]
-pub(crate) fn nearest_child<L: Lanes8>(
-    node: &Node,
-    slab: &SlabRay<L>,
-    distance: f32,
-    stack: &mut Stack,
-) -> Option<u32> {
+fn nearest_child<L: Lanes8>(node: &Node, slab: &SlabRay<L>, distance: f32, stack: &mut Stack) -> Option<u32> {
     let [sx, sy, sz] = slab.near_side;
     let planes = &node.planes;
     let (entry, exit) = slab.pass(

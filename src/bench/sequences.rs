@@ -103,9 +103,13 @@ impl Random {
     }
 }
 
-struct Sheet {
-    side: u32,
-    frames: u32,
+/// A wavy sheet over [−1, 1]², and a time that runs from 0 in frame 0 to 1 in the last.
+#[derive(Debug)]
+pub struct Sheet {
+    /// Points on a side, at least 2.
+    pub side: u32,
+    /// Frames, at least 2.
+    pub frames: u32,
 }
 
 impl Sheet {
@@ -115,8 +119,9 @@ impl Sheet {
         [x, y, 0.3 * (4.0 * x).sin() * (3.0 * y).cos()]
     }
 
-    /// The sheet in a frame, its points moved: `place` is given the time, 0 to 1, the point and its place in its row.
-    fn moved(&self, frame: u32, place: impl Fn(f64, [f64; 3], u32) -> [f64; 3]) -> String {
+    /// The OBJ text of the sheet in a frame, its points moved: `place` is given the time, the point and its place in its
+    /// row.
+    pub fn moved(&self, frame: u32, place: impl Fn(f64, [f64; 3], u32) -> [f64; 3]) -> String {
         let t = f64::from(frame) / f64::from(self.frames - 1);
         let mut text = String::new();
         for j in 0..self.side {

@@ -72,6 +72,8 @@ pub struct Residency {
     pub trees: BTreeMap<PartHash, TreeState>,
     /// Frames that were made resident.
     pub turn: u64,
+    /// Bytes held now.
+    bytes: u64,
     /// The most bytes ever held.
     pub peak_bytes: u64,
     /// Parts and trees that were there when a frame needed them.
@@ -85,7 +87,7 @@ pub struct Residency {
 impl Residency {
     /// Bytes held now.
     pub fn bytes(&self) -> u64 {
-        self.held.values().map(|held| held.bytes).sum()
+        self.bytes
     }
 
     /// A frame's turn begins.
@@ -104,8 +106,9 @@ impl Residency {
     /// A part or tree was not there and is now held.
     pub fn hold(&mut self, name: PartHash, bytes: u64) {
         self.misses += 1;
-        self.held.insert(name, Held { bytes, last_used: self.turn, again: false });
-        self.peak_bytes = self.peak_bytes.max(self.bytes());
+        let before = self.held.insert(name, Held { bytes, last_used: self.turn, again: false });
+        self.bytes = self.bytes + bytes - before.map_or(0, |held| held.bytes);
+        self.peak_bytes = self.peak_bytes.max(self.bytes);
     }
 
     /// A tree was built.
@@ -118,14 +121,15 @@ impl Residency {
     pub fn refit(&mut self, from: PartHash, to: PartHash, geometry: &Geometry, cost: f64) {
         self.hits += 1;
         if let (Some(held), Some(state)) = (self.held.remove(&from), self.trees.remove(&from)) {
-            self.held.insert(to, Held { last_used: self.turn, ..held });
+            let before = self.held.insert(to, Held { last_used: self.turn, ..held });
+            self.bytes -= before.map_or(0, |held| held.bytes);
             self.trees.insert(to, state.refitted(geometry, cost));
         }
     }
 
     /// Gives up a part or tree.
     pub fn free(&mut self, name: PartHash) {
-        self.held.remove(&name);
+        self.bytes -= self.held.remove(&name).map_or(0, |held| held.bytes);
         self.trees.remove(&name);
     }
 
@@ -144,11 +148,11 @@ impl Residency {
         }
     }
 
-    /// What this turn's frame does not use, the least recently used first, with the bytes.
-    pub fn idle(&self) -> Vec<(PartHash, u64)> {
+    /// What this turn's frame does not use, the least recently used first.
+    pub fn idle(&self) -> Vec<PartHash> {
         let idle = self.held.iter().filter(|(_, held)| held.last_used < self.turn);
-        let mut idle: Vec<_> = idle.map(|(name, held)| (held.last_used, *name, held.bytes)).collect();
+        let mut idle: Vec<_> = idle.map(|(name, held)| (held.last_used, *name)).collect();
         idle.sort_unstable();
-        idle.into_iter().map(|(_, name, bytes)| (name, bytes)).collect()
+        idle.into_iter().map(|(_, name)| name).collect()
     }
 }

@@ -59,6 +59,7 @@ fn apply(residency: &mut Residency, objects: Vec<Object>, wishes: &Wishes) -> Ve
         });
     }
     residency.end(&plan.again);
+    assert_eq!(residency.bytes(), residency.held.values().map(|held| held.bytes).sum::<u64>());
     words
 }
 

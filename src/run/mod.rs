@@ -191,8 +191,11 @@ pub fn render(
         for note in notes {
             match note {
                 Note::Frame(frame) => {
-                    on_event(&Event::Frame(frame.clone()));
-                    report.frame(*frame);
+                    // kept in this thread's part of the heap: among what readers take and give back it would hold
+                    // their memory in pieces
+                    let kept = FrameReport::clone(&frame);
+                    on_event(&Event::Frame(frame));
+                    report.frame(kept);
                 }
                 Note::Warnings(w) => tell(&w, &mut warnings, &mut report, on_event),
                 Note::Device(d) => report.devices[0] = d,

@@ -9,7 +9,7 @@ use super::{Note, RunOptions, panic_text};
 use crate::device::Stop;
 use crate::diff::Change;
 use crate::format::{FormatError, Loaded, ReadOptions};
-use crate::job::{Job, Picture, Settings, Source};
+use crate::job::{Job, Picture, Settings};
 use crate::output::{Bits, Encoding, Format, Records};
 use crate::scene::{Frame, Object, PartHash, PartHasher, Shot};
 use crate::warning::Warnings;
@@ -53,6 +53,8 @@ pub(super) struct Reader<'a> {
     prepared: Prepared,
     /// The last picture that shows a file.
     last_shown: HashMap<&'a Path, usize>,
+    /// The first picture of each sequence.
+    first_of: HashMap<usize, usize>,
 }
 
 /// Reads pictures in turn until there are no more, never more ahead of the device than there are slots.
@@ -93,11 +95,12 @@ impl<'a> Reader<'a> {
         records: &'a Records,
         prepared: Prepared,
     ) -> Self {
-        let mut last_shown = HashMap::new();
+        let (mut last_shown, mut first_of) = (HashMap::new(), HashMap::new());
         for (index, picture) in job.pictures.iter().enumerate() {
             last_shown.extend(files(job, picture).map(|(_, path)| (path, index)));
+            first_of.entry(picture.sequence).or_insert(index);
         }
-        Self { job, options, records, prepared, last_shown }
+        Self { job, options, records, prepared, last_shown, first_of }
     }
 
     /// Which objects of a picture stand in files that later pictures show, too.
@@ -123,8 +126,9 @@ impl<'a> Reader<'a> {
         let mut report = self.blank(index);
         self.refuse_beyond_memory(&mut report, expected_bytes)?;
         let sources = &self.prepared.sources;
-        let loaded =
-            load_frame(self.job, picture, sources, self.options.lenient, self.options.strict, warnings);
+        let is_first = self.first_of.get(&picture.sequence) == Some(&index);
+        let RunOptions { lenient, strict, .. } = *self.options;
+        let loaded = load_frame(self.job, picture, is_first, sources, lenient, strict, warnings);
         let (frame, views, sources) = match loaded {
             Ok(loaded) => {
                 report.bytes.read = loaded.bytes_read;
@@ -255,9 +259,11 @@ fn files<'a>(job: &'a Job, picture: &'a Picture) -> impl Iterator<Item = (usize,
     shown.filter_map(|(place, s)| Some((place, &*layers[s.layer].files[s.file?].path)))
 }
 
+/// Reads a picture's frame; `is_first` where it is the first of its sequence.
 fn load_frame(
     job: &Job,
     picture: &Picture,
+    is_first: bool,
     sources: &Sources,
     lenient: bool,
     strict: bool,
@@ -293,8 +299,13 @@ fn load_frame(
             all.frame.objects.extend(shown.objects);
             continue;
         }
-        let (loaded, first) = sources.load(path, &options, place(job, picture, source))?;
-        if first {
+        let place = match layer.files.len() {
+            1 => Place::Only,
+            _ if is_first => Place::First,
+            _ => Place::Later,
+        };
+        let (loaded, is_new) = sources.load(path, &options, place)?;
+        if is_new {
             all.bytes_read += loaded.bytes_read;
             all.read_ms += loaded.read_ms;
             all.parse_ms += loaded.parse_ms;
@@ -312,18 +323,6 @@ fn load_frame(
     Ok(all)
 }
 
-/// Where a source's file stands among those of its layer that the job asks for.
-fn place(job: &Job, picture: &Picture, source: &Source) -> Place {
-    let first = job.pictures.iter().find(|p| p.sequence == picture.sequence).unwrap_or(picture);
-    if job.sequences[picture.sequence].layers[source.layer].files.len() == 1 {
-        Place::Only
-    } else if first.sources.iter().any(|s| (s.layer, s.file) == (source.layer, source.file)) {
-        Place::First
-    } else {
-        Place::Later
-    }
-}
-
 /// Reads the frame of a picture, without the run around it.
 pub fn read_frame(
     job: &Job,
@@ -332,7 +331,9 @@ pub fn read_frame(
     lenient: bool,
     warnings: &mut Warnings,
 ) -> Result<Frame, String> {
-    load_frame(job, picture, sources, lenient, false, warnings).map(|l| l.frame).map_err(LoadError::text)
+    load_frame(job, picture, false, sources, lenient, false, warnings)
+        .map(|l| l.frame)
+        .map_err(LoadError::text)
 }
 
 /// Names frames that nothing can be seen of.

@@ -107,14 +107,17 @@ impl Resident {
         let start = Stopwatch::start();
         let tree = pool.install(|| stored_or_built(name, geometry, store));
         // many small objects may need more than the estimate
-        for (idle, _) in self.residency.idle() {
-            if self.residency.bytes() + tree.bytes() <= device.budget_bytes {
-                break;
+        let needed_bytes = |residency: &Residency| residency.bytes() + tree.bytes();
+        if needed_bytes(&self.residency) > device.budget_bytes {
+            for idle in self.residency.idle() {
+                self.forget(idle);
+                self.residency.evict(idle);
+                if needed_bytes(&self.residency) <= device.budget_bytes {
+                    break;
+                }
             }
-            self.forget(idle);
-            self.residency.evict(idle);
         }
-        refuse_beyond(device, self.residency.bytes() + tree.bytes())?;
+        refuse_beyond(device, needed_bytes(&self.residency))?;
         let state = TreeState::built(geometry, tree.cost());
         self.residency.hold_tree(name, tree.bytes(), state);
         self.trees.insert(name, Arc::new(tree));
