@@ -2,10 +2,10 @@
 //! tree just built and one refitted in place go the same way.
 
 use super::collapse::Shape;
-use super::fit_lanes::{FitBlocks, FitNodes, Mesh, Row};
+use super::fit_lanes::{FitBlocks, FitNodes, Positions, Row};
 use super::lanes::{Width, per_axis};
 use super::slab::Aabb;
-use super::tree::{Block, Node, Tree, WIDTH};
+use super::tree::{Block, NO_TRIANGLE, Node, Tree, WIDTH};
 use rayon::prelude::*;
 
 /// Blocks, or nodes of a level, that one thread takes together.
@@ -19,6 +19,7 @@ impl Tree {
             nodes: shape.children.into_iter().map(node).collect(),
             blocks: shape.blocks.into_par_iter().with_min_len(GRAIN).map(block).collect(),
             levels: shape.levels,
+            vertices: Vec::new(),
             triangle_count: triangles.len() as u32,
             vertex_box: Aabb::EMPTY,
             bounds: Aabb::EMPTY,
@@ -27,25 +28,36 @@ impl Tree {
             half_areas: Vec::new(),
             moved: Vec::new(),
         };
-        tree.refit(positions, triangles);
+        tree.reindex(triangles);
+        tree.refit(positions);
         tree
     }
 
+    /// Takes triangles that are made of other corners than those before; a refit must follow. Their number must be that
+    /// which the tree was built over.
+    pub fn reindex(&mut self, triangles: &[[u32; 3]]) {
+        assert_eq!(triangles.len(), self.triangle_count as usize, "a tree is refitted to as many triangles");
+        let vertices = |block: &Block| {
+            let [first, ..] = block.triangles;
+            let numbers = block.triangles.map(|t| if t == NO_TRIANGLE { first } else { t });
+            per_axis(|corner| numbers.map(|t| triangles[t as usize][corner]))
+        };
+        self.blocks.par_iter().with_min_len(GRAIN).map(vertices).collect_into_vec(&mut self.vertices);
+    }
+
     /// Fits the tree as it stands to other positions, in the current rayon pool. Leaves whose corners stand still are left
-    /// alone, and nodes above nothing but such leaves; the tree is the one that a refit of all of it gives. Triangles
-    /// that are made of other corners are taken as they are now; their number must be that which the tree was built over.
-    pub fn refit(&mut self, positions: &[[f32; 3]], triangles: &[[u32; 3]]) {
-        self.refit_in(Width::detect(), positions, triangles);
+    /// alone, and nodes above nothing but such leaves; the tree is the one that a refit of all of it gives.
+    pub fn refit(&mut self, positions: &[[f32; 3]]) {
+        self.refit_in(Width::detect(), positions);
     }
 
     /// [`Self::refit`] in lanes of a width; the tree is the same in each.
-    pub(crate) fn refit_in(&mut self, width: Width, positions: &[[f32; 3]], triangles: &[[u32; 3]]) {
-        assert_eq!(triangles.len(), self.triangle_count as usize, "a tree is refitted to as many triangles");
+    pub(crate) fn refit_in(&mut self, width: Width, positions: &[[f32; 3]]) {
         // one way into the pool, not one for each level
-        rayon::scope(|_| self.refit_here(width, &Mesh::new(positions, triangles)));
+        rayon::scope(|_| self.refit_here(width, &Positions::new(positions)));
     }
 
-    fn refit_here(&mut self, width: Width, mesh: &Mesh) {
+    fn refit_here(&mut self, width: Width, positions: &Positions) {
         let nodes = self.nodes.len();
         let all = self.moved.is_empty();
         self.moved.resize(nodes + self.blocks.len(), true);
@@ -56,7 +68,10 @@ impl Tree {
             .par_chunks_mut(GRAIN)
             .zip(self.rows[nodes..].par_chunks_mut(GRAIN))
             .zip(self.moved[nodes..].par_chunks_mut(GRAIN))
-            .map(|((blocks, rows), moved)| width.compute(FitBlocks { blocks, rows, moved, all, mesh }))
+            .zip(self.vertices.par_chunks(GRAIN))
+            .map(|(((blocks, rows), moved), vertices)| {
+                width.compute(FitBlocks { blocks, vertices, rows, moved, all, positions })
+            })
             .reduce(|| Aabb::EMPTY, |a, b| a.union(&b));
         for level in self.levels.iter().rev() {
             let (rows, below) = self.rows.split_at_mut(level.end);
@@ -115,7 +130,7 @@ fn half_area(b: &Aabb) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::accel::tree::{LEAF, NO_CHILD, NO_TRIANGLE};
+    use crate::accel::tree::{LEAF, NO_CHILD};
     use crate::accel::triangle::has_area;
     use crate::accel::{Quality, validate};
 
@@ -148,15 +163,15 @@ mod tests {
         let (moved, _) = mesh(2);
         let mut tree = Tree::build(&positions, &triangles, Quality::Fastest);
         for positions in [&positions, &moved] {
-            tree.refit_in(Width::Portable, positions, &triangles);
+            tree.refit_in(Width::Portable, positions);
             assert_eq!(validate(&tree, positions, &triangles), Ok(()));
             for width in Width::available() {
                 for threads in [1, 3] {
                     let mut other = tree.clone();
                     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-                    pool.install(|| other.refit_in(*width, &mesh(4).0, &triangles));
+                    pool.install(|| other.refit_in(*width, &mesh(4).0));
                     assert!(bits(&other) != bits(&tree));
-                    pool.install(|| other.refit_in(*width, positions, &triangles));
+                    pool.install(|| other.refit_in(*width, positions));
                     assert!(bits(&other) == bits(&tree), "{width:?}, {threads} threads");
                     assert_eq!(other.vertex_box(), tree.vertex_box());
                 }
@@ -175,13 +190,14 @@ mod tests {
             let mut whole = tree.clone();
             whole.moved.clear();
             for tree in [&mut tree, &mut whole] {
-                tree.refit(&moved, &triangles);
+                tree.reindex(&triangles);
+                tree.refit(&moved);
                 assert_eq!(validate(tree, &moved, &triangles), Ok(()));
             }
             assert!(bits(&tree) == bits(&whole));
             assert_eq!(tree.vertex_box(), whole.vertex_box());
         }
-        tree.refit(&moved, &triangles);
+        tree.refit(&moved);
         let still = tree.moved.iter().filter(|moved| !**moved).count();
         assert!(still > tree.moved.len() / 2, "{still} of {}", tree.moved.len());
     }

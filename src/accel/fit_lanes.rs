@@ -1,6 +1,6 @@
 //! What a refit does with a block and with a node: the eight triangles, or children, side by side.
 
-use super::lanes::{InLanes, Lanes, Lanes8, per_axis, per_lane, prefetch};
+use super::lanes::{InLanes, Lanes, Lanes8, per_axis, per_lane};
 use super::slab::{Aabb, own_margin};
 use super::tree::{Block, LEAF, NO_TRIANGLE, Node, WIDTH};
 use super::triangle::{has_area, surely_have_area};
@@ -21,45 +21,32 @@ impl Row {
     }
 }
 
-/// Positions and triangles, where each position is four floats.
-pub(crate) struct Mesh<'a> {
-    positions: &'a [f32],
+/// Positions, of which each can be read as four floats.
+pub(crate) struct Positions<'a> {
+    floats: &'a [f32],
     /// The last position, which has no float after it.
     last: [f32; 4],
-    triangles: &'a [[u32; 3]],
 }
 
-impl<'a> Mesh<'a> {
-    pub(crate) fn new(positions: &'a [[f32; 3]], triangles: &'a [[u32; 3]]) -> Self {
+impl<'a> Positions<'a> {
+    pub(crate) fn new(positions: &'a [[f32; 3]]) -> Self {
         let [x, y, z] = positions.last().copied().unwrap_or_default();
-        Self { positions: positions.as_flattened(), last: [x, y, z, 0.0], triangles }
+        Self { floats: positions.as_flattened(), last: [x, y, z, 0.0] }
     }
 
     /// A vertex's position and a float that means nothing.
     #[inline(always)]
-    fn position(&self, vertex: u32) -> &[f32; 4] {
+    fn of(&self, vertex: u32) -> &[f32; 4] {
         let at = 3 * vertex as usize;
-        match self.positions.get(at..at + 4).and_then(|p| p.first_chunk()) {
+        match self.floats.get(at..at + 4).and_then(|p| p.first_chunk()) {
             Some(position) => position,
             None => self.last(at),
         }
     }
 
-    /// Asks for the triangles of a block soon after the i-th: where they stand anywhere in the file, most of a refit's time
-    /// is waiting for them. (Asking for their corners too takes longer on a mesh that fits the cache.)
-    #[inline(always)]
-    fn prefetch(&self, blocks: &[Block], i: usize) {
-        const AHEAD: usize = 8;
-        if let Some(block) = blocks.get(i + AHEAD) {
-            for &triangle in &block.triangles {
-                prefetch(self.triangles, triangle as usize);
-            }
-        }
-    }
-
     #[cold]
     fn last(&self, at: usize) -> &[f32; 4] {
-        assert_eq!(at + 3, self.positions.len(), "a corner is one of the positions");
+        assert_eq!(at + 3, self.floats.len(), "a corner is one of the positions");
         &self.last
     }
 }
@@ -68,12 +55,14 @@ impl<'a> Mesh<'a> {
 /// are those that it has is left alone with its row.
 pub(crate) struct FitBlocks<'a> {
     pub(crate) blocks: &'a mut [Block],
+    /// Their vertices, as [`Tree::vertices`](super::tree::Tree::vertices).
+    pub(crate) vertices: &'a [[[u32; WIDTH]; 3]],
     pub(crate) rows: &'a mut [Row],
     /// Whether a block is not left alone.
     pub(crate) moved: &'a mut [bool],
     /// Whether none is.
     pub(crate) all: bool,
-    pub(crate) mesh: &'a Mesh<'a>,
+    pub(crate) positions: &'a Positions<'a>,
 }
 
 impl InLanes for FitBlocks<'_> {
@@ -83,10 +72,9 @@ impl InLanes for FitBlocks<'_> {
     fn compute<L: Lanes8>(self) -> Aabb {
         let mut least = [L::splat(f32::INFINITY); 3];
         let mut greatest = [L::splat(f32::NEG_INFINITY); 3];
-        for (i, (row, moved)) in self.rows.iter_mut().zip(self.moved).enumerate() {
-            self.mesh.prefetch(self.blocks, i);
-            let block = &mut self.blocks[i];
-            let [min, max] = fit_block::<L>(block, row, moved, self.all, self.mesh);
+        let Self { blocks, vertices, rows, moved, all, positions } = self;
+        for (((block, vertices), row), moved) in blocks.iter_mut().zip(vertices).zip(rows).zip(moved) {
+            let [min, max] = fit_block::<L>(block, vertices, row, moved, all, positions);
             // the second is given where the first is NaN
             least = per_axis(|k| min[k].min(least[k]));
             greatest = per_axis(|k| max[k].max(greatest[k]));
@@ -108,22 +96,17 @@ impl InLanes for FitBlocks<'_> {
 #[inline(always)]
 fn fit_block<L: Lanes8>(
     block: &mut Block,
+    vertices: &[[u32; WIDTH]; 3],
     row: &mut Row,
     moved: &mut bool,
     all: bool,
-    mesh: &Mesh,
+    positions: &Positions,
 ) -> [[L; 3]; 2] {
-    // lanes without a triangle take the first one's corners and lose them again
-    let first = block.triangles[0];
     let numbers = block.triangles;
-    let triangles = per_lane(|i| {
-        let number = if numbers[i] == NO_TRIANGLE { first } else { numbers[i] };
-        &mesh.triangles[number as usize]
-    });
     // no closure, which might not be inlined
     let mut corners = [[L::splat(0.0); 3]; 3];
-    for (k, corner) in corners.iter_mut().enumerate() {
-        *corner = L::transpose(per_lane(|i| mesh.position(triangles[i][k])));
+    for (corner, vertices) in corners.iter_mut().zip(vertices) {
+        *corner = L::transpose(per_lane(|i| positions.of(vertices[i])));
     }
     let mut nothing = per_lane(|i| if numbers[i] == NO_TRIANGLE { f32::NAN } else { -0.0 });
     let present = clear(&mut corners, &nothing);

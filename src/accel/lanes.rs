@@ -97,19 +97,6 @@ impl Width {
     }
 }
 
-/// Asks for the cache line of an element that will be read soon; nothing where there is none.
-#[inline(always)]
-pub(crate) fn prefetch<T>(from: &[T], at: usize) {
-    #[cfg(target_arch = "x86_64")]
-    if at < from.len() {
-        use std::arch::x86_64::{_MM_HINT_T0, _mm_prefetch};
-        // SAFETY: reads nothing, faults nowhere, and SSE is part of the architecture
-        unsafe { _mm_prefetch::<_MM_HINT_T0>(from.as_ptr().wrapping_add(at).cast()) };
-    }
-    #[cfg(not(target_arch = "x86_64"))]
-    let _ = (from, at);
-}
-
 impl Lanes for f32 {
     #[inline(always)]
     fn splat(x: f32) -> Self {

@@ -56,6 +56,9 @@ pub struct Tree {
     pub(crate) blocks: Vec<Block>,
     /// The nodes of each level.
     pub(crate) levels: Vec<Range<usize>>,
+    /// For each block the vertices of its triangles, by corner and lane, those of its first one in lanes without a
+    /// triangle: looking them up through the triangles' numbers would be half of a refit.
+    pub(crate) vertices: Vec<[[u32; WIDTH]; 3]>,
     pub(crate) triangle_count: u32,
     pub(crate) vertex_box: Aabb,
     /// The box of the root's children.
@@ -94,6 +97,7 @@ impl Tree {
         (size_of::<Self>()
             + size_of_val(&*self.nodes)
             + size_of_val(&*self.blocks)
+            + size_of_val(&*self.vertices)
             + size_of_val(&*self.rows)
             + size_of_val(&*self.half_areas)
             + size_of_val(&*self.moved)

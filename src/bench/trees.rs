@@ -66,7 +66,7 @@ pub(super) fn trees(bench: &Bench, meshes: &[Mesh]) -> Table {
             bench.rounds(100),
             [&mut || {
                 turn ^= 1;
-                tree.refit(&poses[turn], triangles);
+                tree.refit(&poses[turn]);
             }],
         );
         let scene = TracedScene::new(vec![TracedObject::new(

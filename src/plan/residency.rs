@@ -3,8 +3,8 @@
 use crate::scene::{Geometry, PartHash};
 use std::collections::{BTreeMap, BTreeSet};
 
-/// What a tree is taken to need for each triangle before it is built; real scenes take 70 to 90.
-pub const TREE_BYTES_PER_TRIANGLE: u64 = 100;
+/// What a tree is taken to need for each triangle before it is built; real scenes take 90 to 110.
+pub const TREE_BYTES_PER_TRIANGLE: u64 = 120;
 
 /// What is known of a tree that a device holds.
 #[derive(Clone, Debug, PartialEq)]

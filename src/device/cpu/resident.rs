@@ -63,10 +63,17 @@ impl Resident {
                     let geometry = &object.geometry;
                     let refitted = Stopwatch::start();
                     let tree = self.trees.remove(&from);
+                    let state = self.residency.trees.get(&from);
+                    let has_corners = state.is_some_and(|s| s.parts.contains(&geometry.triangles.hash()));
                     let is_good = tree.is_some_and(|mut tree| {
                         // no trace is under way, so that nobody else holds it and nothing is copied
                         let in_place = Arc::make_mut(&mut tree);
-                        pool.install(|| in_place.refit(&geometry.positions.0, &geometry.triangles.0));
+                        pool.install(|| {
+                            if !has_corners {
+                                in_place.reindex(&geometry.triangles.0);
+                            }
+                            in_place.refit(&geometry.positions.0);
+                        });
                         self.residency.refit(from, name, geometry, in_place.cost());
                         self.trees.insert(name, tree);
                         self.residency.trees.get(&name).is_some_and(|s| s.ratio() <= keep_up_to)
