@@ -1,6 +1,7 @@
 //! Embree as a peer, by the program of `benches/peers/embree_bench.cpp`: one JSON object a line.
 
-use std::path::Path;
+use super::times::Spread;
+use std::path::PathBuf;
 use std::process::{Command, Stdio};
 
 /// What the program said of a mesh.
@@ -20,17 +21,46 @@ pub(super) struct Embree {
     pub(super) hits: Option<f64>,
 }
 
-/// Runs the program on an OBJ with its own camera, or with the options of one. None where it cannot be run or says
-/// nothing that is understood.
-pub(super) fn measure(program: &Path, obj: &Path, camera: &[String], threads: usize) -> Option<Embree> {
-    let output = Command::new(program)
-        .arg(obj)
-        .args(camera)
-        .stdin(Stdio::null())
-        .stderr(Stdio::null())
-        .output()
-        .ok()?;
-    read(&String::from_utf8_lossy(&output.stdout), threads)
+impl Embree {
+    /// The median of each figure in several runs; None without any.
+    pub(super) fn medians(runs: &[Self]) -> Option<Self> {
+        let of = |figure: fn(&Self) -> Option<f64>| {
+            Spread::of(runs.iter().filter_map(figure).collect()).map(|spread| spread.median)
+        };
+        Some(Self {
+            version: runs.first()?.version.clone(),
+            refit_one_thread_ms: of(|e| e.refit_one_thread_ms),
+            refit_ms: of(|e| e.refit_ms),
+            single_ms: of(|e| e.single_ms),
+            packet_ms: of(|e| e.packet_ms),
+            hits: of(|e| e.hits),
+        })
+    }
+}
+
+/// The program, and what it is run on.
+pub(super) struct Program {
+    /// Where it is.
+    pub(super) path: PathBuf,
+    /// The mesh.
+    pub(super) obj: PathBuf,
+    /// Options of a camera; the program's own where there are none.
+    pub(super) camera: Vec<String>,
+}
+
+impl Program {
+    /// Runs it. None where it cannot be run or says nothing that is understood.
+    pub(super) fn run(&self, threads: usize) -> Option<Embree> {
+        let output = Command::new(&self.path)
+            .arg(&self.obj)
+            .args(&self.camera)
+            .args(["--brief", "--threads", &threads.to_string()])
+            .stdin(Stdio::null())
+            .stderr(Stdio::null())
+            .output()
+            .ok()?;
+        read(&String::from_utf8_lossy(&output.stdout), threads)
+    }
 }
 
 fn read(text: &str, threads: usize) -> Option<Embree> {
@@ -81,5 +111,13 @@ not json
         };
         assert_eq!(read(text, 2), Some(expected));
         assert_eq!(read("", 2), None);
+    }
+
+    #[test]
+    fn each_figure_has_its_own_median() {
+        let run = |refit_ms, hits| Embree { refit_ms: Some(refit_ms), hits, ..Embree::default() };
+        let runs = [run(3.0, Some(12.0)), run(1.0, None), run(2.0, Some(12.0))];
+        assert_eq!(Embree::medians(&runs), Some(run(2.0, Some(12.0))));
+        assert_eq!(Embree::medians(&[]), None);
     }
 }

@@ -30,12 +30,15 @@ impl Consecutive {
     }
 }
 
+/// The column of the rate at which frames are read with the one before at hand.
+pub(super) const RATE: &str = "next, MB/s";
+
 /// Reads each.
 pub(super) fn reading(bench: &Bench, all: &[Consecutive]) -> Table {
     let mut table = Table::new(
         "reading",
         "Reading OBJ, one thread: mean of frames spread over each sequence; \"next\" is a frame with the one before it at hand.",
-        &["MB", "tobj, ms", "whole, ms", "next, ms", "next, MB/s", "tobj/whole", "tobj/next"],
+        &["MB", "tobj, ms", "whole, ms", "next, ms", RATE, "tobj/whole", "tobj/next"],
     );
     let (options, textures) = (ReadOptions::default(), TextureCache::default());
     let for_tobj = tobj::LoadOptions { triangulate: true, ..Default::default() };

@@ -23,6 +23,13 @@ impl Spread {
     }
 }
 
+/// How long a work takes, in milliseconds.
+pub(super) fn time(work: impl FnOnce()) -> f64 {
+    let clock = Stopwatch::start();
+    work();
+    clock.ms()
+}
+
 /// Runs each of some works once unmeasured, then all in turn so many times, at least once; gives milliseconds.
 pub(super) fn in_turn<const N: usize>(rounds: usize, mut works: [&mut dyn FnMut(); N]) -> [Spread; N] {
     let mut ms = [const { Vec::new() }; N];
@@ -31,9 +38,7 @@ pub(super) fn in_turn<const N: usize>(rounds: usize, mut works: [&mut dyn FnMut(
     }
     for _ in 0..rounds.max(1) {
         for (work, ms) in works.iter_mut().zip(&mut ms) {
-            let clock = Stopwatch::start();
-            work();
-            ms.push(clock.ms());
+            ms.push(time(work));
         }
     }
     ms.map(|ms| Spread::of(ms).unwrap_or(Spread { median: 0.0, least: 0.0, greatest: 0.0 }))

@@ -1,11 +1,13 @@
 //! Trees: how long building, refitting and tracing takes, beside Embree.
 
+use super::embree::{Embree, Program};
 use super::table::{Cell, Table};
-use super::times::in_turn;
+use super::times::{Spread, in_turn, time};
 use super::view::{Rays, View};
-use super::{Bench, embree::Embree};
+use super::{Bench, BenchError};
 use crate::accel::{Quality, TracedObject, TracedScene, Tree};
 use crate::scene::Geometry;
+use rayon::ThreadPoolBuilder;
 use std::f32::consts::TAU;
 use std::sync::Arc;
 
@@ -17,8 +19,8 @@ pub(super) struct Mesh {
     pub(super) geometry: Arc<Geometry>,
     /// From where.
     pub(super) view: Option<View>,
-    /// The peer's figures.
-    pub(super) embree: Option<Embree>,
+    /// The peer.
+    pub(super) embree: Option<Program>,
 }
 
 /// A wave of 2 % of the largest extent along x, as in the Embree program.
@@ -33,19 +35,26 @@ fn moved(positions: &[[f32; 3]]) -> Vec<[f32; 3]> {
     positions.iter().map(wave).collect()
 }
 
-/// Builds, refits and traces each, with all threads of the current pool.
-pub(super) fn trees(bench: &Bench, meshes: &[Mesh]) -> Table {
-    let version = meshes.iter().find_map(|m| m.embree.as_ref()).map_or("not installed", |e| &e.version);
-    let about = format!(
-        "Trees, {} threads, all vertices moved; camera rays and a shadow ray for each hit, 1280x720, in batches, no shading. Embree: {version}.",
-        rayon::current_num_threads()
-    );
+/// The column of Embree's refit with one thread.
+pub(super) const EMBREE_REFIT_1: &str = "Embree refit 1, ms";
+
+/// Rounds in which we and the peer take turns, and what each does in one: as many refits and traces as the peer.
+const ROUNDS: usize = 7;
+const REFITS: usize = 15;
+const TRACES: usize = 7;
+
+/// Builds, refits and traces each.
+pub(super) fn trees(bench: &Bench, meshes: &[Mesh]) -> Result<Table, BenchError> {
+    let threads = bench.options.threads;
+    let pool = ThreadPoolBuilder::new().num_threads(threads).build().map_err(|_| BenchError::NoThreads)?;
+    let mut version = "not installed".to_string();
     let columns = [
         "triangles",
         "build, ms",
         "refit, ms",
         "Embree refit, ms",
         "Embree/refit",
+        EMBREE_REFIT_1,
         "rays, ms",
         "Embree rays 1, ms",
         "Embree rays 16, ms",
@@ -53,47 +62,65 @@ pub(super) fn trees(bench: &Bench, meshes: &[Mesh]) -> Table {
         "hits",
         "Embree hits",
     ];
-    let mut table = Table::new("trees", about, &columns);
-    for Mesh { name, geometry, view, embree } in meshes {
-        let (positions, triangles) = (&geometry.positions.0, &geometry.triangles.0);
-        let poses = [positions.clone(), moved(positions)];
-        let mut tree = Tree::build(positions, triangles, Quality::default());
-        let mut turn = 0;
-        let [build] =
-            in_turn(bench.rounds(9), [&mut || drop(Tree::build(positions, triangles, Quality::default()))]);
-        // over and over, as the peer does
-        let [refit] = in_turn(
-            bench.rounds(100),
-            [&mut || {
-                turn ^= 1;
-                tree.refit(&poses[turn]);
-            }],
-        );
-        let scene = TracedScene::new(vec![TracedObject::new(
-            Arc::new(Tree::build(positions, triangles, Quality::default())),
-            None,
-        )]);
-        let mut rays = Rays::new(view.as_ref(), positions);
-        let [traced] = in_turn(bench.rounds(9), [&mut || rays.trace(&scene)]);
-        let of = |figure: fn(&Embree) -> Option<f64>| Cell::from(embree.as_ref().and_then(figure));
-        let [refit, traced] = [refit, traced].map(Cell::from);
+    let mut table = Table::new("trees", String::new(), &columns);
+    for mesh in meshes {
+        // from inside the pool, as the peer's own thread is one of its workers
+        let Measured { built, refits, traces, hits, peers } = pool.install(|| measure(bench, mesh));
+        let peer = Embree::medians(&peers);
+        let of = |figure: fn(&Embree) -> Option<f64>| Cell::from(peer.as_ref().and_then(figure));
+        let [refit, traced] = [refits, traces].map(|ms| Cell::from(Spread::of(ms)));
         let (their_refit, single) = (of(|e| e.refit_ms), of(|e| e.single_ms));
         table.row(
-            name.clone(),
+            mesh.name.clone(),
             [
-                (triangles.len() as f64).into(),
-                build.into(),
+                (mesh.geometry.triangles.0.len() as f64).into(),
+                built.into(),
                 refit,
                 their_refit,
                 refit.times_in(their_refit),
+                of(|e| e.refit_one_thread_ms),
                 traced,
                 single,
                 of(|e| e.packet_ms),
                 traced.times_in(single),
-                (rays.hits() as f64).into(),
+                (hits as f64).into(),
                 of(|e| e.hits),
             ],
         );
+        if let Some(peer) = peer {
+            version = peer.version;
+        }
     }
-    table
+    table.about = format!(
+        "Trees, {threads} threads, all vertices moved; camera rays and a shadow ray for each hit, 1280x720, in batches, no shading. Embree, in turn with us: {version}."
+    );
+    Ok(table)
+}
+
+/// Times in ms, of the peer too.
+struct Measured {
+    built: Spread,
+    refits: Vec<f64>,
+    traces: Vec<f64>,
+    hits: usize,
+    peers: Vec<Embree>,
+}
+
+/// Measures with the threads of the current pool.
+fn measure(bench: &Bench, Mesh { geometry, view, embree, .. }: &Mesh) -> Measured {
+    let (positions, triangles) = (&geometry.positions.0, &geometry.triangles.0);
+    let build = || Tree::build(positions, triangles, Quality::default());
+    let [built] = in_turn(bench.rounds(9), [&mut || drop(build())]);
+    let poses = [positions.clone(), moved(positions)];
+    let mut tree = build();
+    let scene = TracedScene::new(vec![TracedObject::new(Arc::new(build()), None)]);
+    let mut rays = Rays::new(view.as_ref(), positions);
+    let (mut refits, mut traces, mut peers) = (Vec::new(), Vec::new(), Vec::new());
+    for _ in 0..bench.rounds(ROUNDS) {
+        peers.extend(embree.as_ref().and_then(|program| program.run(rayon::current_num_threads())));
+        // tracing wakes the threads, as the peer's build does
+        traces.extend((0..TRACES).map(|_| time(|| rays.trace(&scene))));
+        refits.extend((0..REFITS).map(|i| time(|| tree.refit(&poses[(i + 1) % 2]))));
+    }
+    Measured { built, refits, traces, hits: rays.hits(), peers }
 }

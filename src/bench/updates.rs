@@ -1,13 +1,14 @@
 //! The workload `updates`: reading, trees, warm frames, refit or rebuild, the store, on scenes and on made sequences.
 
+use super::embree::Program;
 use super::policy::{Input, policy};
-use super::reading::{Consecutive, reading};
+use super::reading::{Consecutive, RATE, reading};
 use super::sequences::{HOSTILE, write_wave};
 use super::start::starts;
-use super::trees::{Mesh, trees};
+use super::trees::{EMBREE_REFIT_1, Mesh, trees};
 use super::view::View;
 use super::warm::{WarmPeers, warm_frames};
-use super::{Bench, BenchError, Event, Findings, embree};
+use super::{Bench, BenchError, Event, Findings};
 use crate::format::{ReadOptions, TextureCache, load_obj};
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -46,22 +47,20 @@ pub(super) fn updates(bench: &Bench, on_event: &mut dyn FnMut(&Event<'_>)) -> Re
             all.iter().map(|(name, folder)| Consecutive::of(name, &obj_files(folder))).collect();
         findings.add(reading(bench, &read), on_event);
     }
-    let mut meshes = Vec::new();
     if bench.wants("trees") {
         on_event(&Event::Stage("trees"));
-        meshes = self::meshes(bench, &hostile)?;
-        findings.add(trees(bench, &meshes), on_event);
+        findings.add(trees(bench, &meshes(bench, &hostile)?)?, on_event);
     }
     if bench.wants("warm") {
         on_event(&Event::Stage("warm frames"));
-        let rows =
-            findings.tables.iter().filter(|table| table.name == "reading").flat_map(|table| &table.rows);
-        let peers = |name: &str| WarmPeers {
-            reading: rows.clone().find(|(row, _)| row == name).and_then(|(_, cells)| cells[4].value()),
-            embree_refit_ms: meshes
-                .iter()
-                .find(|mesh| name.starts_with(&mesh.name))
-                .and_then(|mesh| mesh.embree.as_ref()?.refit_one_thread_ms),
+        let found = |table: &str, column: &str, is_row: &dyn Fn(&str) -> bool| {
+            let table = findings.tables.iter().find(|t| t.name == table)?;
+            let column = table.columns.iter().position(|c| c == column)?;
+            table.rows.iter().find(|(row, _)| is_row(row)).and_then(|(_, cells)| cells[column].value())
+        };
+        let peers = |wave: &str| WarmPeers {
+            reading: found("reading", RATE, &|row| row == wave),
+            embree_refit_ms: found("trees", EMBREE_REFIT_1, &|mesh| wave.starts_with(mesh)),
         };
         let with_peers: Vec<_> =
             waves.iter().map(|(name, folder)| (name.clone(), &**folder, peers(name))).collect();
@@ -111,7 +110,7 @@ fn meshes(bench: &Bench, hostile: &[(String, PathBuf)]) -> Result<Vec<Mesh>, Ben
             .map_err(|e| BenchError::Frame(e.to_string()))?;
         let camera = view.map(|v| v.options()).unwrap_or_default();
         let program = bench.options.embree.as_deref();
-        let embree = program.and_then(|p| embree::measure(p, &file, &camera, rayon::current_num_threads()));
+        let embree = program.map(|p| Program { path: p.to_path_buf(), obj: file.clone(), camera });
         Ok(Mesh { name: name.to_string(), geometry: Arc::clone(&loaded.geometry), view, embree })
     };
     all.map(load).collect()
