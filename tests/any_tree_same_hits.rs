@@ -39,11 +39,15 @@ fn batches_give_the_answers_of_single_rays() {
             .map(|(t, seed)| TracedObject::new(soup(500, seed).tree(Quality::Fastest), t.as_ref()))
             .collect(),
     );
-    let eye = Vec3::new(0.3, 0.2, 3.0);
+    // from the front, and from where the largest component of directions is now one, now another
+    let eyes = [Vec3::new(0.3, 0.2, 3.0), Vec3::splat(1.7)];
     for (scene, &width) in [one, three].iter().flat_map(|s| Width::available().iter().map(move |w| (s, w))) {
         let scene = scene.clone().with_width(width);
         for size in [[160, 90], [5, 3], [1, 1]] {
-            assert_batches_are_single_rays(&scene, &rays::camera_rays(eye, Vec3::ZERO, 60.0, size), "camera");
+            for eye in eyes {
+                let rays = rays::camera_rays(eye, Vec3::ZERO, 60.0, size);
+                assert_batches_are_single_rays(&scene, &rays, "camera");
+            }
         }
         assert_batches_are_single_rays(&scene, &random_rays(3000, 21), "random");
         let light = Vec3::new(0.5, 4.0, 1.0);
@@ -96,6 +100,8 @@ fn coincident_and_coplanar_triangles_come_in_the_order_of_their_numbers() {
         let hits = all_hits(&mesh.scene(quality), &down);
         assert_eq!(hits.iter().map(|h| h.triangle).collect::<Vec<_>>(), expected, "{quality:?}");
         assert!(hits.iter().all(|h| h.distance == hits[0].distance));
+        let rays = rays::camera_rays(Vec3::new(0.4, 0.3, 1.0), Vec3::new(0.4, 0.3, 0.0), 60.0, [40, 40]);
+        assert_batches_are_single_rays(&mesh.scene(quality), &rays, &format!("{quality:?}"));
     }
     // on the diagonal, which all of them share, every one is hit
     let diagonal = Ray { origin: Vec3::new(0.5, 0.5, 1.0), direction: Vec3::NEG_Z };

@@ -4,16 +4,18 @@ use super::Ray;
 use super::lanes::{Lanes, Lanes8, per_axis};
 use super::slab::{EXIT_FACTOR, SlabRay, inverse};
 use super::tree::WIDTH;
+use super::triangle::{ShearRay, last_axis, shear, sheared_axes};
 
 /// Rays in a packet.
 pub(crate) const RAYS: usize = GROUPS * WIDTH;
-const GROUPS: usize = 2;
+pub(crate) const GROUPS: usize = 2;
 
 /// The slab tests of a packet's rays. All meet the sides of boxes in the same order.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct PacketSlabs<L> {
     /// By axis and ray; a packet that is not full repeats its first ray.
     origin: [[f32; RAYS]; 3],
+    direction: [[f32; RAYS]; 3],
     inverse: [[f32; RAYS]; 3],
     pub(crate) groups: [SlabRay<L>; GROUPS],
     pub(crate) interval: Interval<L>,
@@ -66,7 +68,22 @@ impl<L: Lanes8> PacketSlabs<L> {
             greatest_inverse: splat(greatest_inverse),
             near_side,
         };
-        Some(Self { origin, inverse: inverses, groups: [group(0), group(1)], interval })
+        Some(Self { origin, direction, inverse: inverses, groups: [group(0), group(1)], interval })
+    }
+
+    /// Whether these are the axes of every ray's sheared space.
+    #[inline(always)]
+    fn share_axes(&self, [x, y, z]: [usize; 3]) -> bool {
+        let mut are_shared = true;
+        for g in 0..GROUPS {
+            let size = per_axis(|k| {
+                let d = L::load(&self.direction[k].as_chunks::<WIDTH>().0[g]);
+                d.max(L::splat(0.0).sub(d))
+            });
+            // strictly, so that it does not matter which is taken of two that are as long
+            are_shared &= size[x].lt(size[z]) & size[y].lt(size[z]) == 0xff;
+        }
+        are_shared
     }
 
     /// One of the rays.
@@ -77,6 +94,73 @@ impl<L: Lanes8> PacketSlabs<L> {
             inverse: per_axis(|k| self.inverse[k][i]),
             near_side: self.interval.near_side,
         }
+    }
+}
+
+/// The edge tests of a packet's rays.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct PacketShears {
+    /// By axis of the sheared space and ray.
+    shear: [[f32; RAYS]; 3],
+    axes: Axes,
+}
+
+/// The axes of the sheared space; where not all rays have the same, the last of each.
+#[derive(Clone, Copy, Debug)]
+enum Axes {
+    Shared([usize; 3]),
+    ByRay([u8; RAYS]),
+}
+
+impl PacketShears {
+    #[inline(always)]
+    pub(crate) fn new<L: Lanes8>(of: &PacketSlabs<L>) -> Self {
+        let last = |i: usize| last_axis(per_axis(|k| of.direction[k][i]));
+        let mut shears = [[0.0; RAYS]; 3];
+        let first = sheared_axes(last(0));
+        if of.share_axes(first) {
+            for g in 0..GROUPS {
+                let direction = first.map(|k| L::load(&of.direction[k].as_chunks::<WIDTH>().0[g]));
+                for (to, lanes) in shears.iter_mut().zip(shear(direction)) {
+                    to.as_chunks_mut::<WIDTH>().0[g] = lanes.store();
+                }
+            }
+            return Self { shear: shears, axes: Axes::Shared(first) };
+        }
+        let mut by_ray = [0; RAYS];
+        for (i, of_ray) in by_ray.iter_mut().enumerate() {
+            *of_ray = last(i) as u8;
+            let shear = shear(sheared_axes(last(i)).map(|k| of.direction[k][i]));
+            for k in 0..3 {
+                shears[k][i] = shear[k];
+            }
+        }
+        Self { shear: shears, axes: Axes::ByRay(by_ray) }
+    }
+
+    /// One of the rays in all lanes.
+    #[inline(always)]
+    pub(crate) fn ray<L: Lanes8>(&self, slabs: &PacketSlabs<L>, i: usize) -> ShearRay<L> {
+        let axes = match &self.axes {
+            Axes::Shared(axes) => *axes,
+            Axes::ByRay(last) => sheared_axes(usize::from(last[i])),
+        };
+        ShearRay {
+            axes,
+            origin: per_axis(|k| L::splat(slabs.origin[axes[k]][i])),
+            shear: per_axis(|k| L::splat(self.shear[k][i])),
+        }
+    }
+
+    /// Eight of the rays side by side; None where not all of the packet have the same axes.
+    #[inline(always)]
+    pub(crate) fn group<L: Lanes8>(&self, slabs: &PacketSlabs<L>, g: usize) -> Option<ShearRay<L>> {
+        let Axes::Shared(axes) = self.axes else { return None };
+        Some(ShearRay {
+            axes,
+            origin: per_axis(|k| slabs.groups[g].origin[axes[k]]),
+            shear: per_axis(|k| L::load(&self.shear[k].as_chunks::<WIDTH>().0[g])),
+        })
     }
 }
 

@@ -16,8 +16,28 @@ use super::{HitOrder, Ray};
 pub(crate) struct ShearRay<L> {
     /// The axes (x, y, z) of the sheared space.
     pub(crate) axes: [usize; 3],
-    origin: [L; 3],
-    shear: [L; 3],
+    pub(crate) origin: [L; 3],
+    pub(crate) shear: [L; 3],
+}
+
+/// The axis of a direction's largest component.
+#[inline(always)]
+pub(crate) fn last_axis(direction: [f32; 3]) -> usize {
+    let [x, y, z] = direction.map(f32::abs);
+    if x >= y && x >= z { 0 } else { 1 + usize::from(y < z) }
+}
+
+/// The axes of a sheared space.
+#[inline(always)]
+pub(crate) fn sheared_axes(last: usize) -> [usize; 3] {
+    [(last + 1) % 3, (last + 2) % 3, last]
+}
+
+/// How far a step along the last axis goes along the others and along the ray; of directions with their components in the
+/// order of [`sheared_axes`].
+#[inline(always)]
+pub(crate) fn shear<L: Lanes>([x, y, z]: [L; 3]) -> [L; 3] {
+    [x.div(z), y.div(z), L::splat(1.0).div(z)]
 }
 
 /// Values of the three edges, each opposite to a corner: its weight times the determinant.
@@ -32,17 +52,10 @@ impl<L: Lanes> ShearRay<L> {
     #[inline(always)]
     pub(crate) fn new(ray: &Ray) -> Self {
         let d = ray.direction.to_array();
-        let size = per_axis(|k| d[k].abs());
-        let kz =
-            if size[0] >= size[1] && size[0] >= size[2] { 0 } else { 1 + usize::from(size[1] < size[2]) };
-        let axes = [(kz + 1) % 3, (kz + 2) % 3, kz];
+        let axes = sheared_axes(last_axis(d));
         let o = ray.origin.to_array();
-        let z = d[kz];
-        Self {
-            axes,
-            origin: per_axis(|k| L::splat(o[axes[k]])),
-            shear: [L::splat(d[axes[0]] / z), L::splat(d[axes[1]] / z), L::splat(1.0 / z)],
-        }
+        let shear = shear(axes.map(|k| d[k]));
+        Self { axes, origin: per_axis(|k| L::splat(o[axes[k]])), shear: per_axis(|k| L::splat(shear[k])) }
     }
 
     /// A vertex, its coordinates in the order of [`Self::axes`], as seen along the ray.
@@ -73,18 +86,6 @@ impl<L: Lanes> ShearRay<L> {
         let [az, bz, cz] = edges.depths;
         let depth = u.mul(az).add(v.mul(bz)).add(w.mul(cz));
         depth.div(edges.determinant()).mul(self.shear[2])
-    }
-}
-
-impl ShearRay<f32> {
-    /// The same ray in all lanes.
-    #[inline(always)]
-    pub(crate) fn splat<L: Lanes>(&self) -> ShearRay<L> {
-        ShearRay {
-            axes: self.axes,
-            origin: per_axis(|k| L::splat(self.origin[k])),
-            shear: per_axis(|k| L::splat(self.shear[k])),
-        }
     }
 }
 
