@@ -45,7 +45,9 @@ pub(super) fn reading(bench: &Bench, all: &[Consecutive]) -> Table {
     for Consecutive { name, pairs } in all {
         let before: Vec<_> = pairs
             .iter()
-            .map(|[file, _]| load_obj_after(None, file, &options, &textures).ok().and_then(|(_, p)| p))
+            .map(|[file, _]| {
+                load_obj_after(None, Vec::new(), file, &options, &textures).ok().and_then(|(_, p)| p)
+            })
             .collect();
         let next = || pairs.iter().map(|[_, next]| next);
         let count = pairs.len().max(1) as f64;
@@ -62,7 +64,7 @@ pub(super) fn reading(bench: &Bench, all: &[Consecutive]) -> Table {
                 &mut || next().for_each(|f| drop(black_box(load_obj(f, &options, &textures)))),
                 &mut || {
                     for (before, f) in before.iter().zip(next()) {
-                        drop(black_box(load_obj_after(before.as_ref(), f, &options, &textures)));
+                        drop(black_box(load_obj_after(before.as_ref(), Vec::new(), f, &options, &textures)));
                     }
                 },
             ],

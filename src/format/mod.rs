@@ -83,19 +83,21 @@ pub struct Loaded {
 /// Reads an OBJ and all that it refers to; textures through a cache. Must not be called from a thread of rayon's pool
 /// (see [`TextureCache`]).
 pub fn load_obj(path: &Path, options: &ReadOptions, textures: &TextureCache) -> Result<Loaded, FormatError> {
-    load_obj_after(None, path, options, textures).map(|(loaded, _)| loaded)
+    load_obj_after(None, Vec::new(), path, options, textures).map(|(loaded, _)| loaded)
 }
 
 /// [`load_obj`] with another frame of the sequence at hand: what is the same there is not read again, and shared. What
-/// comes out does not depend on it. The second value serves the next frame; None where it would not help.
+/// comes out does not depend on it. The text goes into `room`, for which an older frame's can be given: new memory costs
+/// more than reading does. The second value serves the next frame; None where it would not help.
 pub fn load_obj_after(
     before: Option<&Parsed>,
+    room: Vec<u8>,
     path: &Path,
     options: &ReadOptions,
     textures: &TextureCache,
 ) -> Result<(Loaded, Option<Parsed>), FormatError> {
     let watch = Stopwatch::start();
-    let bytes = text::read(path)?;
+    let bytes = text::read_into(room, path)?;
     load_text(before, bytes, watch.ms(), None, path, options, textures)
 }
 

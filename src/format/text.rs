@@ -32,8 +32,15 @@ pub(super) fn ends_number(byte: u8) -> bool {
 
 /// Reads a plain file whole.
 pub(super) fn read(path: &Path) -> Result<Vec<u8>, FormatError> {
+    read_into(Vec::new(), path)
+}
+
+/// [`read`] into memory that is at hand.
+pub(super) fn read_into(room: Vec<u8>, path: &Path) -> Result<Vec<u8>, FormatError> {
     let (mut file, length) = open(path)?;
-    let mut bytes = Vec::with_capacity(length as usize + 1);
+    let mut bytes = room;
+    bytes.clear();
+    bytes.reserve(length as usize + 1);
     file.read_to_end(&mut bytes).map_err(|source| unreadable(path, source))?;
     within_limit(path, bytes.len() as u64)?;
     Ok(bytes)

@@ -35,6 +35,14 @@ struct Kept {
     used: bool,
 }
 
+/// What the next frame of a layer is read with.
+struct Latest {
+    layer: PathBuf,
+    parsed: Arc<Parsed>,
+    /// Memory that held texts of older ones.
+    rooms: Vec<Vec<u8>>,
+}
+
 /// Where a file stands among those of its layer that a run reads.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Place {
@@ -56,8 +64,8 @@ pub struct Sources {
     textures: TextureCache,
     store: Option<Arc<Store>>,
     pub(super) animations: Animations,
-    /// Of each layer the frame that was read last, as its text; the layer read last stands last.
-    latest: Mutex<Vec<(PathBuf, Arc<Parsed>)>>,
+    /// Of each layer the frame that was read last; the layer read last stands last.
+    latest: Mutex<Vec<Latest>>,
     /// Whether nothing is kept for later frames.
     cold: bool,
 }
@@ -144,33 +152,41 @@ impl Sources {
     ) -> Result<Loaded, FormatError> {
         let layer = without_numbers(path);
         let is_followed = place != Place::Only;
-        let before = if is_followed { self.before(&layer) } else { None };
+        let (before, room) = if is_followed { self.before(&layer) } else { Default::default() };
         let is_stored = place != Place::Later && before.is_none() && file_bytes >= LEAST_STORED_BYTES;
         let (loaded, parsed) = if let Some(store) = self.store.as_deref().filter(|_| is_stored) {
             format::load_obj_stored(store, is_followed, path, options, &self.textures)?
         } else {
-            format::load_obj_after(before.as_deref(), path, options, &self.textures)?
+            format::load_obj_after(before.as_deref(), room, path, options, &self.textures)?
         };
         if let Some(parsed) = parsed.filter(|_| is_followed) {
-            self.keep_latest(layer, parsed);
+            self.keep_latest(layer, parsed, before);
         }
         Ok(loaded)
     }
 
-    /// The frame of a layer that was read last. Which one it is depends on the readers' pace; what is read by it does
-    /// not.
-    fn before(&self, layer: &Path) -> Option<Arc<Parsed>> {
-        let latest = self.latest.lock().unwrap_or_else(PoisonError::into_inner);
-        latest.iter().find(|(known, _)| known == layer).map(|(_, parsed)| Arc::clone(parsed))
+    /// The frame of a layer that was read last, and memory for the text of the next. Which one it is depends on the
+    /// readers' pace; what is read by it does not.
+    fn before(&self, layer: &Path) -> (Option<Arc<Parsed>>, Vec<u8>) {
+        let mut latest = self.latest.lock().unwrap_or_else(PoisonError::into_inner);
+        match latest.iter_mut().find(|latest| latest.layer == layer) {
+            Some(latest) => (Some(Arc::clone(&latest.parsed)), latest.rooms.pop().unwrap_or_default()),
+            None => (None, Vec::new()),
+        }
     }
 
-    fn keep_latest(&self, layer: PathBuf, parsed: Parsed) {
+    /// Keeps a frame that was read with `before` at hand.
+    fn keep_latest(&self, layer: PathBuf, parsed: Parsed, before: Option<Arc<Parsed>>) {
         let mut latest = self.latest.lock().unwrap_or_else(PoisonError::into_inner);
-        latest.retain(|(known, _)| *known != layer);
+        let known = latest.iter().position(|latest| latest.layer == layer).map(|i| latest.remove(i));
         if latest.len() >= MAX_LAYERS {
             latest.remove(0);
         }
-        latest.push((layer, Arc::new(parsed)));
+        let (known, mut rooms) = known.map_or_else(Default::default, |l| (Some(l.parsed), l.rooms));
+        // the last reader that has a frame leaves its memory to those of the next ones
+        let older = [before, known].into_iter().flatten().filter_map(Arc::into_inner);
+        rooms.extend(older.map(Parsed::into_text));
+        latest.push(Latest { layer, parsed: Arc::new(parsed), rooms });
     }
 }
 

@@ -25,6 +25,13 @@ pub struct Parsed {
     pub(super) known: Known,
 }
 
+impl Parsed {
+    /// The memory of its text.
+    pub fn into_text(self) -> Vec<u8> {
+        self.bytes
+    }
+}
+
 /// Reads a text that has the faces of `before`, whatever materials they have. The lists of faces stay empty but for
 /// the normals' indices, which are settled. None where there is anything that [`Known`] cannot describe.
 pub(super) fn scan_again<'a>(text: &'a [u8], before: &Parsed) -> Option<Scan<'a>> {
