@@ -80,8 +80,13 @@ fn update_and_trace_ms(frame: &FrameReport) -> f64 {
 fn render(bench: &Bench, input: &Input, update: Update) -> Result<Vec<FrameReport>, BenchError> {
     let job = bench.job(&input.folder, None)?;
     let device = CpuDevice::new(bench.options.threads, u64::MAX).map_err(|_| BenchError::NoThreads)?;
-    let options =
-        RunOptions { threads: bench.options.threads, update, overwrite: true, ..RunOptions::default() };
+    let options = RunOptions {
+        threads: bench.options.threads,
+        update,
+        overwrite: true,
+        keeps_reports: true,
+        ..RunOptions::default()
+    };
     let outcome = run::render(&job, &options, Box::new(device), &Stop::default(), &mut |_| {})?;
     Ok(outcome.report.frames)
 }

@@ -53,6 +53,7 @@ pub(super) fn run_options(args: &RenderArgs) -> RunOptions {
         lenient: args.lenient,
         strict: args.strict,
         report: args.report.clone(),
+        keeps_reports: false,
         store: store_of(args),
     }
 }

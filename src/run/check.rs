@@ -64,17 +64,28 @@ fn real(path: &Path) -> Option<PathBuf> {
     path.canonicalize().ok()
 }
 
-/// Turns frames whose pictures are not there any more into failed ones and returns them.
-pub(super) fn pictures_gone(job: &Job, report: &mut Report) -> Vec<FrameReport> {
+/// Turns frames whose pictures are not there any more into failed ones and returns them. `failed` reports a frame that is
+/// not kept.
+pub(super) fn pictures_gone(
+    job: &Job,
+    report: &mut Report,
+    failed: impl Fn(usize, &str) -> Box<FrameReport>,
+) -> Vec<FrameReport> {
     let mut gone = Vec::new();
-    for frame in report.frames.iter_mut().filter(|f| f.status != Status::Failed) {
-        let files = files_of(&job.pictures[frame.index]);
-        if let Some(path) = files.iter().map(|f| job.folder.join(f)).find(|f| !f.is_file()) {
-            frame.status = Status::Failed;
-            frame.error =
-                Some(format!("{}: was written and is gone; render the frame again", path.display()));
-            gone.push(frame.clone());
-        }
+    for (index, status) in report.ended.iter_mut().filter(|(_, status)| *status != Status::Failed) {
+        let index = *index as usize;
+        let files = files_of(&job.pictures[index]);
+        let Some(path) = files.iter().map(|f| job.folder.join(f)).find(|f| !f.is_file()) else { continue };
+        let error = format!("{}: was written and is gone; render the frame again", path.display());
+        *status = Status::Failed;
+        let place = report.frames.iter().position(|f| f.index == index).unwrap_or_else(|| {
+            report.frames.push(*failed(index, &error));
+            report.frames.len() - 1
+        });
+        let frame = &mut report.frames[place];
+        frame.status = Status::Failed;
+        frame.error = Some(error);
+        gone.push(frame.clone());
     }
     gone
 }

@@ -61,6 +61,9 @@ pub struct RunOptions {
     pub strict: bool,
     /// Where the report goes.
     pub report: Option<PathBuf>,
+    /// Whether the outcome has the reports of all frames, as it has where a report goes somewhere; else only of those that
+    /// failed, so that a run may be of any length.
+    pub keeps_reports: bool,
     /// What is kept on disk from run to run; None: nothing.
     pub store: Option<Arc<Store>>,
 }
@@ -136,7 +139,10 @@ pub fn render(
     check::nothing_is_lost(job, &records, options)?;
     clean_up(job);
     let mut warnings = Warnings::default();
-    let mut report = Report::new(vec![DeviceReport::new(device.info())]);
+    let mut report = Report::new(
+        vec![DeviceReport::new(device.info())],
+        options.keeps_reports || options.report.is_some(),
+    );
     on_event(&Event::Start {
         frames: job.pictures.len(),
         folder: job.folder.display().to_string(),
@@ -193,9 +199,8 @@ pub fn render(
                 Note::Frame(frame) => {
                     // kept in this thread's part of the heap: among what readers take and give back it would hold
                     // their memory in pieces
-                    let kept = FrameReport::clone(&frame);
+                    report.frame(&frame);
                     on_event(&Event::Frame(frame));
-                    report.frame(kept);
                 }
                 Note::Warnings(w) => tell(&w, &mut warnings, &mut report, on_event),
                 Note::Device(d) => report.devices[0] = d,
@@ -212,7 +217,7 @@ pub fn render(
         tell(&notes, &mut warnings, &mut report, on_event);
     }
     if !stop.asked() {
-        for gone in check::pictures_gone(job, &mut report) {
+        for gone in check::pictures_gone(job, &mut report, |index, error| reader.failed(index, error)) {
             on_event(&Event::Frame(Box::new(gone)));
         }
     }

@@ -207,7 +207,7 @@ impl<'a> Reader<'a> {
         })
     }
 
-    fn failed(&self, index: usize, error: &str) -> Box<FrameReport> {
+    pub(super) fn failed(&self, index: usize, error: &str) -> Box<FrameReport> {
         let mut report = self.blank(index);
         report.error = Some(format!("{}: {error}", report.source));
         report

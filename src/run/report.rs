@@ -105,15 +105,20 @@ pub struct Report {
     pub devices: Vec<DeviceReport>,
     /// Counts.
     pub totals: Totals,
-    /// The frames in the order in which they were taken.
+    /// The frames in the order of the job; where none but these are kept, those that failed.
     pub frames: Vec<FrameReport>,
+    #[serde(skip)]
+    keeps_all: bool,
+    /// Each picture that ended, by its place in the job, and how.
+    #[serde(skip)]
+    pub(super) ended: Vec<(u32, Status)>,
     /// Warnings as told.
     pub warnings: Vec<String>,
 }
 
 impl Report {
-    /// An empty report.
-    pub fn new(devices: Vec<DeviceReport>) -> Self {
+    /// An empty report that keeps all frames, or only those that fail.
+    pub fn new(devices: Vec<DeviceReport>, keeps_all: bool) -> Self {
         Self {
             rentix: env!("CARGO_PKG_VERSION"),
             wall_s: 0.0,
@@ -121,21 +126,26 @@ impl Report {
             devices,
             totals: Totals::default(),
             frames: Vec::new(),
+            keeps_all,
+            ended: Vec::new(),
             warnings: Vec::new(),
         }
     }
 
     /// Adds a frame that ended.
-    pub fn frame(&mut self, frame: FrameReport) {
-        self.frames.push(frame);
+    pub fn frame(&mut self, frame: &FrameReport) {
+        self.ended.push((frame.index as u32, frame.status));
+        if self.keeps_all || frame.status == Status::Failed {
+            self.frames.push(frame.clone());
+        }
     }
 
     /// Brings counts, times and memory up to now.
     pub fn settle(&mut self, since: &Stopwatch) {
         self.wall_s = since.s();
         self.totals = Totals::default();
-        for f in &self.frames {
-            self.totals.count(f.status);
+        for (_, status) in &self.ended {
+            self.totals.count(*status);
         }
         self.totals.frames_per_s = self.totals.frames as f64 / self.wall_s.max(1e-9);
         self.totals.peak_rss_bytes = peak_rss_bytes();

@@ -44,7 +44,7 @@ fn run(request: &Request, faults: &[(usize, Fault)], options: &RunOptions) -> Ou
 }
 
 fn two_threads() -> RunOptions {
-    RunOptions { threads: 2, ..RunOptions::default() }
+    RunOptions { threads: 2, keeps_reports: true, ..RunOptions::default() }
 }
 
 #[test]
@@ -108,4 +108,45 @@ fn a_run_that_is_told_to_stop_before_it_begins_makes_nothing() {
     let device = Box::new(FakeDevice::new("fake", 1 << 20));
     let outcome = render(&job, &two_threads(), device, &stop, &mut |_| {}).unwrap();
     assert!(outcome.stopped && outcome.report.frames.is_empty() && !t.path().join("out").exists());
+}
+
+#[test]
+fn without_a_report_only_frames_that_fail_are_kept_and_all_are_counted() {
+    let t = tempfile::tempdir().unwrap();
+    let request = sequence(t.path());
+    let options = RunOptions { keeps_reports: false, ..two_threads() };
+    let outcome = run(&request, &[(3, Fault::OutOfMemory)], &options);
+    assert_eq!(statuses(&outcome), [(Some(4), Status::Failed)]);
+    let totals = outcome.report.totals;
+    assert_eq!((totals.frames, totals.rendered, totals.failed), (6, 5, 1));
+}
+
+#[test]
+fn a_picture_that_is_gone_at_the_end_is_told_of_with_and_without_a_report() {
+    for keeps_reports in [true, false] {
+        let t = tempfile::tempdir().unwrap();
+        let job = resolve(&sequence(t.path())).unwrap();
+        let options = RunOptions { keeps_reports, overwrite: true, ..two_threads() };
+        let mut told = Vec::new();
+        let outcome = {
+            let gone = job.folder.join(&job.pictures[1].picture);
+            let mut on_event = |event: &Event| {
+                if let Event::Frame(frame) = event {
+                    told.push((frame.frame, frame.status));
+                    // the last to be told of: the second is there by then, or is the last itself
+                    if told.len() == job.pictures.len() {
+                        std::fs::remove_file(&gone).unwrap();
+                    }
+                }
+            };
+            let device = Box::new(FakeDevice::new("fake", 1 << 20));
+            render(&job, &options, device, &Stop::default(), &mut on_event).unwrap()
+        };
+        assert_eq!(told.last(), Some(&(Some(2), Status::Failed)));
+        let failed: Vec<_> = outcome.failed().collect();
+        assert_eq!(failed.len(), 1);
+        assert!(failed[0].error.as_ref().is_some_and(|e| e.contains("is gone")), "{:?}", failed[0].error);
+        assert_eq!((outcome.report.totals.rendered, outcome.report.totals.failed), (5, 1));
+        assert_eq!(outcome.report.frames.len(), if keeps_reports { FRAMES } else { 1 });
+    }
 }
