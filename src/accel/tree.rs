@@ -57,7 +57,7 @@ pub struct Tree {
     /// The nodes of each level.
     pub(crate) levels: Vec<Range<usize>>,
     /// For each block the vertices of its triangles, by corner and lane, those of its first one in lanes without a
-    /// triangle: looking them up through the triangles' numbers would be half of a refit.
+    /// triangle: looking them up through the triangles' numbers would be a quarter of a refit.
     pub(crate) vertices: Vec<[[u32; WIDTH]; 3]>,
     pub(crate) triangle_count: u32,
     pub(crate) vertex_box: Aabb,

@@ -35,12 +35,14 @@ pub(super) fn read(path: &Path) -> Result<Vec<u8>, FormatError> {
     read_into(Vec::new(), path)
 }
 
-/// [`read`] into memory that is at hand.
+/// [`read`] into memory that is at hand, unless it is too small or much too large.
 pub(super) fn read_into(room: Vec<u8>, path: &Path) -> Result<Vec<u8>, FormatError> {
     let (mut file, length) = open(path)?;
-    let mut bytes = room;
+    let least = length as usize + 1;
+    let fits = (least..=2 * least).contains(&room.capacity());
+    // files of a sequence are of nearly the same length
+    let mut bytes = if fits { room } else { Vec::with_capacity(least + least / 16) };
     bytes.clear();
-    bytes.reserve(length as usize + 1);
     file.read_to_end(&mut bytes).map_err(|source| unreadable(path, source))?;
     within_limit(path, bytes.len() as u64)?;
     Ok(bytes)
@@ -342,6 +344,25 @@ mod tests {
         for plain in [&b""[..], b"v", b"\xEF\xBB\xBFv 1 2 3", b"o \xE6\n", b"\0\0\0\0\0\0"] {
             assert_eq!(refused(plain), None);
         }
+    }
+
+    #[test]
+    fn memory_is_used_again_where_it_fits() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.obj");
+        fs::write(&path, [b'#'; 1000]).unwrap();
+        let again = |capacity: usize| {
+            let mut room = Vec::with_capacity(capacity);
+            room.extend_from_slice(b"what was there before");
+            let place = room.as_ptr();
+            let bytes = read_into(room, &path).unwrap();
+            assert_eq!(bytes, [b'#'; 1000]);
+            assert!(bytes.capacity() <= 2 * 1001);
+            bytes.as_ptr() == place
+        };
+        assert!(again(1001) && again(2002));
+        again(100);
+        assert!(!again(1 << 20));
     }
 
     #[test]

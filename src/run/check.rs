@@ -64,12 +64,12 @@ fn real(path: &Path) -> Option<PathBuf> {
     path.canonicalize().ok()
 }
 
-/// Turns frames whose pictures are not there any more into failed ones and returns them. `failed` reports a frame that is
-/// not kept.
+/// Turns frames whose pictures are not there any more into failed ones and returns them. `blank` gives the report of one
+/// that is not kept.
 pub(super) fn pictures_gone(
     job: &Job,
     report: &mut Report,
-    failed: impl Fn(usize, &str) -> Box<FrameReport>,
+    blank: impl Fn(usize) -> Box<FrameReport>,
 ) -> Vec<FrameReport> {
     let mut gone = Vec::new();
     for (index, status) in report.ended.iter_mut().filter(|(_, status)| *status != Status::Failed) {
@@ -79,7 +79,7 @@ pub(super) fn pictures_gone(
         let error = format!("{}: was written and is gone; render the frame again", path.display());
         *status = Status::Failed;
         let place = report.frames.iter().position(|f| f.index == index).unwrap_or_else(|| {
-            report.frames.push(*failed(index, &error));
+            report.frames.push(*blank(index));
             report.frames.len() - 1
         });
         let frame = &mut report.frames[place];

@@ -217,7 +217,7 @@ pub fn render(
         tell(&notes, &mut warnings, &mut report, on_event);
     }
     if !stop.asked() {
-        for gone in check::pictures_gone(job, &mut report, |index, error| reader.failed(index, error)) {
+        for gone in check::pictures_gone(job, &mut report, |index| reader.blank(index)) {
             on_event(&Event::Frame(Box::new(gone)));
         }
     }

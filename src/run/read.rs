@@ -184,7 +184,7 @@ impl<'a> Reader<'a> {
         }
     }
 
-    fn blank(&self, index: usize) -> Box<FrameReport> {
+    pub(super) fn blank(&self, index: usize) -> Box<FrameReport> {
         let picture = &self.job.pictures[index];
         let sequence = &self.job.sequences[picture.sequence];
         Box::new(FrameReport {
@@ -207,7 +207,7 @@ impl<'a> Reader<'a> {
         })
     }
 
-    pub(super) fn failed(&self, index: usize, error: &str) -> Box<FrameReport> {
+    fn failed(&self, index: usize, error: &str) -> Box<FrameReport> {
         let mut report = self.blank(index);
         report.error = Some(format!("{}: {error}", report.source));
         report

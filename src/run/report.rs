@@ -105,7 +105,7 @@ pub struct Report {
     pub devices: Vec<DeviceReport>,
     /// Counts.
     pub totals: Totals,
-    /// The frames in the order of the job; where none but these are kept, those that failed.
+    /// The frames in the order of the job: all, or only those that failed.
     pub frames: Vec<FrameReport>,
     #[serde(skip)]
     keeps_all: bool,
