@@ -5,9 +5,25 @@ use super::tree::{LEAF, MAX_DEPTH, NO_CHILD, NO_TRIANGLE, WIDTH};
 use rayon::prelude::*;
 use std::ops::Range;
 
-/// From this level on a subtree is split by number, not as the binary tree says: eight levels hold 8⁸ leaves of eight
-/// triangles, more than there are numbers for.
+/// From this level on a subtree is split by number, not as the binary tree says: ten levels hold 8¹⁰ leaves, more
+/// than there are numbers for.
 const SPLIT_BY_NUMBER_LEVEL: usize = MAX_DEPTH - 10;
+
+/// What leaves may be, and what they cost beside nodes.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Leaves {
+    /// Triangles of a leaf at most; [`WIDTH`] at most.
+    pub(crate) most: usize,
+    /// A leaf costs this,
+    pub(crate) block: f32,
+    /// and each of its triangles this; a node costs about 4.
+    pub(crate) triangle: f32,
+}
+
+impl Leaves {
+    /// Of trees whose leaves' triangles are tested all at once.
+    pub(crate) const BLOCKS: Self = Self { most: WIDTH, block: 1.0, triangle: 0.0 };
+}
 
 /// The shape of a wide tree.
 #[derive(Clone, Debug, Default)]
@@ -31,12 +47,12 @@ struct Subtree {
 }
 
 impl Shape {
-    pub(crate) fn collapse(binary: &Binary) -> Self {
+    pub(crate) fn collapse(binary: &Binary, leaves: Leaves) -> Self {
         let mut shape = Self::default();
         if binary.nodes.is_empty() {
             return shape;
         }
-        let is_leaf = leaves(binary);
+        let is_leaf = is_leaf(binary, leaves);
         let subtree = |node: u32| {
             let n = &binary.nodes[node as usize];
             Subtree { node: Some(node), start: n.start, count: n.count, is_leaf: is_leaf[node as usize] }
@@ -48,8 +64,11 @@ impl Shape {
                     s.node = None;
                 }
             }
-            let expanded: Vec<([Subtree; WIDTH], usize)> =
-                level.par_iter().with_min_len(256).map(|s| expand(*s, binary, &subtree)).collect();
+            let expanded: Vec<([Subtree; WIDTH], usize)> = level
+                .par_iter()
+                .with_min_len(256)
+                .map(|s| expand(*s, binary, leaves.most, &subtree))
+                .collect();
             let first = shape.children.len();
             shape.levels.push(first..first + level.len());
             let mut next_node = first + level.len();
@@ -78,25 +97,29 @@ impl Shape {
 
 /// Which binary nodes become leaves: where one test of a block costs less than what is below, by surface area
 /// (Goldsmith and Salmon 1987). A binary node costs a share of the wide node that it dissolves in.
-fn leaves(binary: &Binary) -> Vec<bool> {
-    const BLOCK_COST: f32 = 1.0;
+fn is_leaf(binary: &Binary, leaves: Leaves) -> Vec<bool> {
     const NODE_COST: f32 = 0.5;
     let mut is_leaf = vec![false; binary.nodes.len()];
     let mut cost = vec![0.0_f32; binary.nodes.len()];
     for (i, n) in binary.nodes.iter().enumerate().rev() {
-        let as_block = BLOCK_COST * n.half_area;
+        let as_block = (leaves.block + leaves.triangle * n.count as f32) * n.half_area;
         let child = n.child as usize;
         let as_inner =
             if child == 0 { f32::INFINITY } else { NODE_COST * n.half_area + cost[child] + cost[child + 1] };
-        is_leaf[i] = n.count as usize <= WIDTH && as_block <= as_inner;
+        is_leaf[i] = n.count as usize <= leaves.most && as_block <= as_inner;
         cost[i] = if is_leaf[i] { as_block } else { as_inner };
     }
     is_leaf
 }
 
 /// The children of a subtree: the one with the largest surface is opened until there are eight.
-fn expand(s: Subtree, binary: &Binary, subtree: &impl Fn(u32) -> Subtree) -> ([Subtree; WIDTH], usize) {
-    let Some(root) = s.node else { return split_by_number(s) };
+fn expand(
+    s: Subtree,
+    binary: &Binary,
+    leaf_most: usize,
+    subtree: &impl Fn(u32) -> Subtree,
+) -> ([Subtree; WIDTH], usize) {
+    let Some(root) = s.node else { return split_by_number(s, leaf_most) };
     let mut children = [s; WIDTH];
     let mut count = 1;
     if s.is_leaf {
@@ -121,15 +144,19 @@ fn expand(s: Subtree, binary: &Binary, subtree: &impl Fn(u32) -> Subtree) -> ([S
     (children, count)
 }
 
-fn split_by_number(s: Subtree) -> ([Subtree; WIDTH], usize) {
+fn split_by_number(s: Subtree, leaf_most: usize) -> ([Subtree; WIDTH], usize) {
     let mut children = [s; WIDTH];
-    let size = s.count.div_ceil(WIDTH as u32).max(WIDTH as u32);
+    let size = s.count.div_ceil(WIDTH as u32).max(leaf_most as u32);
     let count = s.count.div_ceil(size);
     for (i, child) in (0..count).zip(&mut children) {
         let start = s.start + i * size;
         let rest = s.start + s.count - start;
-        *child =
-            Subtree { node: None, start, count: size.min(rest), is_leaf: rest.min(size) as usize <= WIDTH };
+        *child = Subtree {
+            node: None,
+            start,
+            count: size.min(rest),
+            is_leaf: rest.min(size) as usize <= leaf_most,
+        };
     }
     (children, count as usize)
 }
@@ -158,7 +185,7 @@ mod tests {
     #[test]
     fn a_chain_is_split_by_number_where_it_grows_too_deep() {
         for leaves in [1, 2, 9, 100, 100_000] {
-            let shape = Shape::collapse(&chain(leaves));
+            let shape = Shape::collapse(&chain(leaves), Leaves::BLOCKS);
             assert!(shape.levels.len() <= MAX_DEPTH, "{leaves}: {} levels", shape.levels.len());
             let mut triangles: Vec<u32> =
                 shape.blocks.as_flattened().iter().copied().filter(|&t| t != NO_TRIANGLE).collect();

@@ -119,7 +119,7 @@ impl Node {
 }
 
 /// Half the surface of a box; 0 of an empty one.
-fn half_area(b: &Aabb) -> f64 {
+pub(super) fn half_area(b: &Aabb) -> f64 {
     if b.is_empty() {
         return 0.0;
     }

@@ -41,6 +41,23 @@ pub struct Placement {
     margin_of_origin: Rows,
 }
 
+/// The numbers of a [`Placement`]; matrices by rows.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PlacementRows {
+    /// The linear part.
+    pub world_from_object: [[f32; 3]; 3],
+    /// The rest of it.
+    pub translation: [f32; 3],
+    /// The linear part's inverse.
+    pub object_from_world: [[f32; 3]; 3],
+    /// The box of the transformed corners of the vertex box.
+    pub world_box: Aabb,
+    /// What that is widened by on each axis for a ray that starts in the world's origin,
+    pub margin: [f32; 3],
+    /// and what is added for each unit of |origin|.
+    pub margin_of_origin: [[f32; 3]; 3],
+}
+
 impl Placement {
     /// Places an object whose vertices lie in a box.
     pub fn new(world_from_object: &DAffine3, vertex_box: &Aabb) -> Self {
@@ -99,6 +116,18 @@ impl Placement {
         Aabb {
             min: std::array::from_fn(|k| self.world_box.min[k] - margin[k]),
             max: std::array::from_fn(|k| self.world_box.max[k] + margin[k]),
+        }
+    }
+
+    /// What kernels of other devices compute the same from.
+    pub fn rows(&self) -> PlacementRows {
+        PlacementRows {
+            world_from_object: self.world_from_object.0,
+            translation: self.translation,
+            object_from_world: self.object_from_world.0,
+            world_box: self.world_box,
+            margin: self.margin,
+            margin_of_origin: self.margin_of_origin.0,
         }
     }
 

@@ -2,12 +2,14 @@
 //! time that is nothing beside a tree's.
 
 use super::Ray;
+use super::packed::{PackedTree, fit, pack};
+use super::placement::Placement;
 use super::slab::Aabb;
 use super::tree::{LEAF, NO_CHILD, Node, WIDTH};
 use crate::math::Vec3;
 
 /// From so many objects on it is faster than asking one after the other.
-pub(crate) const LEAST_OBJECTS: usize = 5;
+pub(super) const LEAST_OBJECTS: usize = 5;
 /// How far from the world's origin rays may start, over how far the objects reach: beyond it they ask one after the
 /// other. An object's box is widened by some ULP of that distance.
 const REACH: f32 = 64.0;
@@ -22,12 +24,8 @@ pub(crate) struct TopLevel {
 }
 
 impl TopLevel {
-    /// Over objects of which `box_for` gives the box for rays that start where one does; None for so few that it does
-    /// not pay.
-    pub(crate) fn build(objects: usize, box_for: impl Fn(usize, &Ray) -> Aabb) -> Option<Self> {
-        if objects < LEAST_OBJECTS {
-            return None;
-        }
+    /// Over objects of which `box_for` gives the box for rays that start where one does.
+    pub(crate) fn build(objects: usize, box_for: impl Fn(usize, &Ray) -> Aabb) -> Self {
         let ray_from = |distance: f32| Ray { origin: Vec3::splat(distance), direction: Vec3::Z };
         let near = ray_from(0.0);
         let farthest = (0..objects)
@@ -45,7 +43,7 @@ impl TopLevel {
         let mut boxes: Vec<(u32, Aabb)> = boxes.filter(|(_, b)| !b.is_empty()).collect();
         let mut nodes = Vec::new();
         add_node(&mut boxes, &mut nodes);
-        Some(Self { nodes, reach })
+        Self { nodes, reach }
     }
 
     /// Whether a ray finds all that it meets.
@@ -53,6 +51,36 @@ impl TopLevel {
     pub(crate) fn covers(&self, ray: &Ray) -> bool {
         // false for NaN
         ray.origin.abs().max_element() <= self.reach
+    }
+}
+
+/// The level above objects for the GPU, packed: what stands at a leaf's places are objects.
+#[derive(Clone, Debug, Default)]
+pub struct PackedTop {
+    /// Nodes and objects.
+    pub tree: PackedTree,
+    /// Rays whose origin is this far away at most, on each axis, find all that they meet.
+    pub reach: f32,
+}
+
+impl PackedTop {
+    /// Over objects: where each stands, and without a placement a box of it in the world.
+    pub fn build(objects: &[(Option<&Placement>, Aabb)]) -> Self {
+        let box_for = |i: usize, ray: &Ray| {
+            let (placement, world_box) = &objects[i];
+            placement.map_or(*world_box, |p| p.box_for(ray))
+        };
+        let top = TopLevel::build(objects.len(), box_for);
+        let numbers: Vec<u32> = (0..objects.len() as u32).collect();
+        let children: Vec<_> = top.nodes.iter().map(|node| node.children).collect();
+        let boxes: Vec<[Aabb; WIDTH]> =
+            top.nodes.iter().map(|node| std::array::from_fn(|lane| node.child_box(lane))).collect();
+        let mut tree = pack(&children, &boxes, |object| &numbers[object as usize..][..1]);
+        fit(&mut tree.nodes, |place| {
+            let object = tree.order[place as usize];
+            box_for(object as usize, &Ray { origin: Vec3::splat(top.reach), direction: Vec3::Z })
+        });
+        Self { tree, reach: top.reach }
     }
 }
 

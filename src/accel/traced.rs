@@ -6,7 +6,7 @@ use super::packet::push_children;
 use super::placement::Placement;
 use super::slab::{Aabb, SlabRay};
 use super::stack::Stack;
-use super::top::TopLevel;
+use super::top::{LEAST_OBJECTS, TopLevel};
 use super::traverse::{Descent, Found};
 use super::tree::{LEAF, Tree, WIDTH};
 use super::triangle::Search;
@@ -69,7 +69,8 @@ impl TracedScene {
             object.first_primitive = first_primitive;
             first_primitive = first_primitive.wrapping_add(object.tree.triangle_count());
         }
-        let top = TopLevel::build(objects.len(), |i, ray| objects[i].box_for(ray));
+        let pays = objects.len() >= LEAST_OBJECTS;
+        let top = pays.then(|| TopLevel::build(objects.len(), |i, ray| objects[i].box_for(ray)));
         Self { objects, top, width: Width::detect() }
     }
 

@@ -2,7 +2,7 @@
 //! in f32. Its shape comes from [`super::collapse`], its boxes from [`super::fit`].
 
 use super::binary::{Binary, Quality};
-use super::collapse::Shape;
+use super::collapse::{Leaves, Shape};
 use super::fit_lanes::Row;
 use super::lanes::per_axis;
 use super::slab::Aabb;
@@ -88,7 +88,7 @@ impl Tree {
     /// Builds over an indexed mesh in the current rayon pool; indices must be within the positions. The tree is the
     /// same for any number of threads. A triangle without area or with a corner that is not finite is never hit.
     pub fn build(positions: &[[f32; 3]], triangles: &[[u32; 3]], quality: Quality) -> Self {
-        let shape = Shape::collapse(&Binary::build(positions, triangles, quality));
+        let shape = Shape::collapse(&Binary::build(positions, triangles, quality), Leaves::BLOCKS);
         Self::fit(shape, positions, triangles)
     }
 

@@ -3,6 +3,7 @@
 use super::Global;
 use crate::device::Device;
 use crate::device::cpu::CpuDevice;
+use crate::device::gpu::{Adapter, adapters};
 use crate::run::machine;
 use anyhow::Result;
 use std::process::ExitCode;
@@ -19,12 +20,59 @@ pub(super) fn devices(global: &Global) -> Result<ExitCode> {
         println!("{line}");
     } else {
         eprintln!(
-            "{}  {}  {}, may hold {:.1} GiB (half of the free memory; --device-memory changes it)",
+            "{}  {}, {}, may hold {} (half of the free memory; --device-memory changes it)",
             info.name,
             machine::machine().cpu,
             info.description,
-            info.budget_bytes as f64 / f64::from(1 << 30)
+            gibibytes(info.budget_bytes)
         );
     }
+    for adapter in adapters() {
+        if global.json {
+            println!("{}", as_json(&adapter));
+        } else {
+            eprintln!("{}", for_people(&adapter));
+        }
+    }
     Ok(ExitCode::SUCCESS)
+}
+
+fn budget_bytes(adapter: &Adapter) -> u64 {
+    if adapter.is_software() { machine::default_budget_bytes() } else { adapter.default_budget_bytes() }
+}
+
+fn as_json(adapter: &Adapter) -> serde_json::Value {
+    let [least, most] = adapter.subgroup_sizes();
+    serde_json::json!({
+        "name": adapter.name(), "kind": "gpu", "description": adapter.description(),
+        "software": adapter.is_software(), "memory_bytes": adapter.memory_bytes(), "budget_bytes": budget_bytes(adapter),
+        "buffer_bytes": adapter.binding_bytes(), "subgroup": {"least": least, "most": most},
+        "features": adapter.features(), "lacks": adapter.lacks(),
+    })
+}
+
+fn for_people(adapter: &Adapter) -> String {
+    let mut text = format!("{}  {}", adapter.name(), adapter.description());
+    if let Some(lacks) = adapter.lacks() {
+        return format!("{text}\n       cannot be used: {lacks}");
+    }
+    if let Some(bytes) = adapter.memory_bytes() {
+        text.push_str(&format!(", {} of memory", gibibytes(bytes)));
+    }
+    text.push_str(&format!(", may hold {}", gibibytes(budget_bytes(adapter))));
+    if adapter.is_software() {
+        text.push_str(" (used only where it is named)");
+    }
+    let [least, most] = adapter.subgroup_sizes();
+    let threads = if least == most { least.to_string() } else { format!("{least} to {most}") };
+    let mut uses = vec![
+        format!("buffers up to {}", gibibytes(adapter.binding_bytes())),
+        format!("{threads} threads in step"),
+    ];
+    uses.extend(adapter.features().into_iter().map(String::from));
+    format!("{text}\n       {}", uses.join(", "))
+}
+
+fn gibibytes(bytes: u64) -> String {
+    format!("{:.1} GiB", bytes as f64 / f64::from(1 << 30))
 }

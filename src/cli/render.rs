@@ -4,12 +4,11 @@ use super::progress::{Progress, ProgressKind};
 use super::render_args::RenderArgs;
 use super::store::store;
 use super::{EXIT_FAILED, EXIT_NO_DEVICE, Global, request, stop};
-use crate::device::Device;
-use crate::device::cpu::CpuDevice;
+use crate::device::{Device, registry};
 use crate::job::{self, FrameSet, Job};
 use crate::run::{self, Event, FrameReport, Outcome, RunOptions, machine};
 use crate::store::Store;
-use anyhow::{Result, bail};
+use anyhow::Result;
 use std::fmt::Write as _;
 use std::process::ExitCode;
 use std::sync::Arc;
@@ -65,13 +64,13 @@ fn store_of(args: &RenderArgs) -> Option<Arc<Store>> {
 
 /// The device asked for.
 pub(super) fn device(args: &RenderArgs, options: &RunOptions) -> Result<Box<dyn Device>> {
-    match args.device.as_deref() {
-        None | Some("cpu" | "all") => {
-            let budget = args.device_memory.unwrap_or_else(machine::default_budget_bytes);
-            Ok(Box::new(CpuDevice::new(threads(args), budget)?.with_store(options.store.clone())))
-        }
-        Some(other) => bail!("there is no device {other}; `rentix devices` lists those there are"),
-    }
+    let wanted = registry::Wanted {
+        threads: threads(args),
+        budget_bytes: args.device_memory,
+        host_budget_bytes: machine::default_budget_bytes(),
+        store: options.store.clone(),
+    };
+    Ok(registry::open(args.device.as_deref(), &wanted)?)
 }
 
 fn threads(args: &RenderArgs) -> usize {

@@ -4,6 +4,8 @@
 pub mod conformance;
 pub mod cpu;
 pub mod fake;
+pub mod gpu;
+pub mod registry;
 
 pub use crate::kernel::RayCounts;
 
@@ -17,6 +19,8 @@ use std::sync::atomic::{AtomicBool, Ordering};
 pub enum DeviceKind {
     /// Cores of the host.
     Cpu,
+    /// A wgpu adapter.
+    Gpu,
     /// The fake device of tests: scripted, draws nothing.
     Fake,
 }
@@ -26,6 +30,7 @@ impl DeviceKind {
     pub fn word(self) -> &'static str {
         match self {
             Self::Cpu => "cpu",
+            Self::Gpu => "gpu",
             Self::Fake => "fake",
         }
     }

@@ -10,24 +10,28 @@ use std::f32::consts::FRAC_1_PI;
 
 /// A triangle that glows.
 #[derive(Clone, Debug)]
-struct Emitter {
-    corners: [Vec3; 3],
-    magnitude: Vec3,
+pub struct Emitter {
+    /// In the world.
+    pub corners: [Vec3; 3],
+    /// As [`super::world::Surface::magnitude`].
+    pub magnitude: Vec3,
     /// Unit.
-    normal: Vec3,
+    pub normal: Vec3,
     /// Ke · (1/π) · its area / the share of points that it is given.
-    radiance: Vec3,
-    /// Its material, and where it stands in the frame.
-    material: u32,
-    place: Hit,
+    pub radiance: Vec3,
+    /// Its material's place in [`World::materials`].
+    pub material: u32,
+    /// Where it stands in the frame.
+    pub place: Hit,
 }
 
 /// The triangles with Ke > 0, chosen by their power: area × sum of the channels of Ke.
 #[derive(Clone, Debug, Default)]
 pub struct Emitters {
-    emitters: Vec<Emitter>,
+    /// In the order of the frame.
+    pub emitters: Vec<Emitter>,
     /// The shares of all emitters up to each, itself included; the last is 1.
-    shares: Vec<f32>,
+    pub shares: Vec<f32>,
 }
 
 impl Emitters {

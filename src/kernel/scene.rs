@@ -29,17 +29,27 @@ impl<'a, A> Scene<'a, A> {
     /// Takes a frame, what its rays are traced against, and a shot.
     pub fn new(aggregate: &'a A, frame: &'a Frame, shot: &'a Shot) -> Self {
         let world = World::new(frame);
-        let has_area_light = shot.lights.iter().any(|l| matches!(l, Light::Area { .. }));
-        let emitters = if has_area_light { Emitters::new(&world) } else { Emitters::default() };
-        let half_fov = (0.5 * shot.camera.fov_deg).to_radians();
+        let emitters = emitters(&world, shot);
         Self {
             aggregate,
             world,
             camera: CameraConstants::new(&shot.camera, shot.size),
-            spread: (2.0 * libm::tan(half_fov) / f64::from(shot.size[1])) as f32,
+            spread: spread(shot),
             lights: shot.lights.iter().map(LightRecord::new).collect(),
             emitters,
             shot,
         }
     }
+}
+
+/// What the area lights of a shot are made of; nothing where it has none.
+pub fn emitters(world: &World, shot: &Shot) -> Emitters {
+    let has_area_light = shot.lights.iter().any(|l| matches!(l, Light::Area { .. }));
+    if has_area_light { Emitters::new(world) } else { Emitters::default() }
+}
+
+/// How much wider a ray's cone becomes with each unit of its path.
+pub fn spread(shot: &Shot) -> f32 {
+    let half_fov = (0.5 * shot.camera.fov_deg).to_radians();
+    (2.0 * libm::tan(half_fov) / f64::from(shot.size[1])) as f32
 }

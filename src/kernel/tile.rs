@@ -73,8 +73,9 @@ pub fn trace_tile<A: Aggregate>(
         }
     }
     if band.wants_center() {
+        // of a single sample the hits are those of these rays, but mirrored rays may have taken their places
+        buffers.aim(scene, band, |_| [0.5; 2]);
         if samples > 1 {
-            buffers.aim(scene, band, |_| [0.5; 2]);
             buffers.trace(scene, &mut counts);
         }
         fill_center(scene, band, &buffers.pixels, &buffers.rays, &buffers.hits);

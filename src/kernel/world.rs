@@ -114,6 +114,21 @@ impl<'a> World<'a> {
         self.slots[self.material(hit) as usize]
     }
 
+    /// For each material its place among those that the frame uses, in the order of their first use.
+    pub fn material_slots(&self) -> &[u32] {
+        &self.slots
+    }
+
+    /// For each slot of an object's geometry the place of its material in [`Self::materials`].
+    pub fn materials_of(&self, object: usize) -> &[u32] {
+        &self.objects[object].materials
+    }
+
+    /// The number of an object's first mesh, counted over all objects.
+    pub fn first_part(&self, object: usize) -> u32 {
+        self.objects[object].first_part
+    }
+
     /// The maps of a material.
     pub fn textures(&self, material: u32) -> Option<&'a Textures> {
         self.textures[material as usize]
@@ -300,17 +315,20 @@ struct Transform {
 
 impl Transform {
     fn new(t: &DAffine3) -> Self {
-        let DMat3 { x_axis: x, y_axis: y, z_axis: z } = t.matrix3;
-        let columns = [y.cross(z), z.cross(x), x.cross(y)];
-        // normals have no length: scaled, so that tiny and huge transforms stay within f32
-        let largest = columns.iter().map(|c| c.abs().max_element()).fold(f64::MIN_POSITIVE, f64::max);
-        let [cx, cy, cz] = columns.map(|c| (c / largest).as_vec3());
-        Self {
-            placement: Placement::new(t, &Aabb::EMPTY),
-            cofactors: Mat3::from_cols(cx, cy, cz),
-            orientation: if columns[2].dot(z) < 0.0 { -1.0 } else { 1.0 },
-        }
+        let (cofactors, orientation) = cofactors(t);
+        Self { placement: Placement::new(t, &Aabb::EMPTY), cofactors, orientation }
     }
+}
+
+/// What takes normals to the world (the cofactors of the linear part, scaled: the inverse transpose but for a factor,
+/// finite where that is not), and -1 where the transform mirrors, else 1.
+pub fn cofactors(t: &DAffine3) -> (Mat3, f32) {
+    let DMat3 { x_axis: x, y_axis: y, z_axis: z } = t.matrix3;
+    let columns = [y.cross(z), z.cross(x), x.cross(y)];
+    // normals have no length: scaled, so that tiny and huge transforms stay within f32
+    let largest = columns.iter().map(|c| c.abs().max_element()).fold(f64::MIN_POSITIVE, f64::max);
+    let [cx, cy, cz] = columns.map(|c| (c / largest).as_vec3());
+    (Mat3::from_cols(cx, cy, cz), if columns[2].dot(z) < 0.0 { -1.0 } else { 1.0 })
 }
 
 /// The weights of a triangle's corners at a hit.

@@ -148,6 +148,13 @@ impl Residency {
         }
     }
 
+    /// The surface-area cost of the trees over that of their last builds, mean by triangles; None without trees.
+    pub fn cost_ratio(&self) -> Option<f64> {
+        let triangles: u64 = self.trees.values().map(|s| s.triangles).sum();
+        let sum: f64 = self.trees.values().map(|s| s.triangles as f64 * s.ratio()).sum();
+        (triangles > 0).then(|| sum / triangles as f64)
+    }
+
     /// What this turn's frame does not use, the least recently used first.
     pub fn idle(&self) -> Vec<PartHash> {
         let idle = self.held.iter().filter(|(_, held)| held.last_used < self.turn);

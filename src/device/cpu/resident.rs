@@ -98,7 +98,7 @@ impl Resident {
         let update_ms = cost.built.ms + cost.refitted.ms;
         cost.upload_ms = Some(start.ms() - update_ms);
         cost.update_ms = Some(update_ms);
-        cost.cost_ratio = self.cost_ratio();
+        cost.cost_ratio = self.residency.cost_ratio();
         Ok(cost)
     }
 
@@ -135,14 +135,6 @@ impl Resident {
     fn forget(&mut self, name: PartHash) {
         self.parts.remove(&name);
         self.trees.remove(&name);
-    }
-
-    /// Mean over the trees by triangles.
-    fn cost_ratio(&self) -> Option<f64> {
-        let trees = || self.residency.trees.values();
-        let triangles: u64 = trees().map(|s| s.triangles).sum();
-        let sum: f64 = trees().map(|s| s.triangles as f64 * s.ratio()).sum();
-        (triangles > 0).then(|| sum / triangles as f64)
     }
 
     /// The scene of a frame that is resident; else the first object whose tree is not there.

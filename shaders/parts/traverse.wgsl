@@ -1,0 +1,286 @@
+// Rays through packed trees (src/accel/packed.rs), and through the level above objects, whose leaves are objects.
+
+// Whether the frame is one object that stands where its vertices say.
+override SINGLE_TREE: bool = false;
+
+// A group of children that wait: the first one's place and which of them were entered; the first entries of each thread's
+// stack are in the workgroup's memory, the others in its own.
+const NEAR: u32 = 6u;
+const FAR: u32 = 44u;
+var<workgroup> near_stack: array<vec2<u32>, 384>;
+// Set by each kernel before it traces.
+var<private> thread_in_group: u32;
+
+// A ray as trees want it.
+struct TracedRay {
+    origin: vec3<f32>,
+    inverse: vec3<f32>,
+    // For each axis whether the ray goes up: what slots are turned by, so that those in front come first.
+    turn: u32,
+    shear: ShearRay,
+}
+
+fn traced_ray(ray: Ray) -> TracedRay {
+    let inverse = inverse_of_each(ray.direction);
+    let up = select(vec3<u32>(0u), vec3<u32>(1u, 2u, 4u), inverse >= vec3<f32>(0.0));
+    return TracedRay(ray.origin, inverse, up.x | up.y | up.z, shear_ray(ray));
+}
+
+// What is looked for along a ray: the first candidate strictly between two places of the order.
+struct Search {
+    after: HitOrder,
+    before: HitOrder,
+    // What was found: ABSENT while nothing was.
+    object: u32,
+    triangle: u32,
+    place: u32,
+    barycentric: vec2<f32>,
+}
+
+// The children of a node that a ray enters not after a distance.
+struct Entered {
+    // As on the stack: the first inner child, in the upper byte those that are entered, in the lower which there are.
+    group: vec2<u32>,
+    // The node's first triangle, and which of them and the others stand in leaves that are entered.
+    leaves: vec2<u32>,
+}
+
+// Of four children those that are entered, as bits of `Entered`.
+fn entered_bits(
+    entry: vec4<f32>,
+    exit: vec4<f32>,
+    distance: f32,
+    meta_bytes: u32,
+    turn4: u32,
+) -> u32 {
+    let is_inner = (meta_bytes & (meta_bytes << 1u)) & 0x10101010u;
+    let inner_mask = (is_inner >> 4u) * 0xffu;
+    let place = unpack4xU8((meta_bytes ^ (turn4 & inner_mask)) & 0x1f1f1f1fu);
+    let bits = unpack4xU8((meta_bytes >> 5u) & 0x07070707u) << place;
+    let of_entered = select(vec4<u32>(0u), bits, entry <= min(exit, vec4<f32>(distance)));
+    return (of_entered.x | of_entered.y) | (of_entered.z | of_entered.w);
+}
+
+// Planes are taken as real numbers and widened by what the computation may be off, 2^-20 of the largest terms (6 · 2^-24
+// are needed), so that nothing inside a box is entered before it, nor met where it is missed.
+fn enter(node: u32, ray: TracedRay, distance: f32) -> Entered {
+    let row = 5u * node;
+    let head = nodes[row];
+    let links = nodes[row + 1u];
+    let low_xy = nodes[row + 2u];
+    let low_z_high_x = nodes[row + 3u];
+    let high_yz = nodes[row + 4u];
+    let exponents = vec3<u32>(head.w & 0xffu, (head.w >> 8u) & 0xffu, (head.w >> 16u) & 0xffu);
+    let step = bitcast<vec3<f32>>(exponents << vec3<u32>(23u)) * ray.inverse;
+    let start = (bitcast<vec3<f32>>(head.xyz) - ray.origin) * ray.inverse;
+    let slack = fma(abs(step), vec3<f32>(256.0), abs(start)) * 0.00000095367431640625;
+    let near = start - slack;
+    let far = start + slack;
+    let back = ray.inverse < vec3<f32>(0.0);
+    let near_x = select(low_xy.xy, low_z_high_x.zw, back.x);
+    let far_x = select(low_z_high_x.zw, low_xy.xy, back.x);
+    let near_y = select(low_xy.zw, high_yz.xy, back.y);
+    let far_y = select(high_yz.xy, low_xy.zw, back.y);
+    let near_z = select(low_z_high_x.xy, high_yz.zw, back.z);
+    let far_z = select(high_yz.zw, low_z_high_x.xy, back.z);
+    let turn4 = ray.turn * 0x01010101u;
+    var bits = 0u;
+    for (var half = 0u; half < 2u; half++) {
+        let entry = max(
+            max(planes(near_x, half, step.x, near.x), planes(near_y, half, step.y, near.y)),
+            max(planes(near_z, half, step.z, near.z), vec4<f32>(0.0)),
+        );
+        let exit = min(
+            min(planes(far_x, half, step.x, far.x), planes(far_y, half, step.y, far.y)),
+            planes(far_z, half, step.z, far.z),
+        ) * EXIT_FACTOR;
+        bits |= entered_bits(entry, exit, distance, select(links.z, links.w, half == 1u), turn4);
+    }
+    return Entered(
+        vec2<u32>(links.x, (bits & 0xff000000u) | (head.w >> 24u)),
+        vec2<u32>(links.y, bits & 0x00ffffffu),
+    );
+}
+
+fn planes(bytes: vec2<u32>, half: u32, step: f32, start: f32) -> vec4<f32> {
+    let of_half = select(bytes.x, bytes.y, half == 1u);
+    return fma(vec4<f32>(unpack4xU8(of_half)), vec4<f32>(step), vec4<f32>(start));
+}
+
+// Tests the triangle at a place; true where it is the first yet of those that are looked for.
+fn test_triangle(place: u32, ray: TracedRay, object: u32, first_primitive: u32, search: ptr<function, Search>) -> bool {
+    let row_a = triangles[3u * place];
+    let row_b = triangles[3u * place + 1u];
+    let row_c = triangles[3u * place + 2u];
+    let a = bitcast<vec3<f32>>(row_a.xyz);
+    let b = bitcast<vec3<f32>>(row_b.xyz);
+    let c = bitcast<vec3<f32>>(row_c.xyz);
+    let in_plane = hit_in_plane(ray.shear, a, b, c);
+    if (!(in_plane.distance > 0.0 && in_plane.distance <= (*search).before.distance)) {
+        return false;
+    }
+    let entry = box_entry(own_box(a, b, c), ray.origin, ray.inverse);
+    if (entry < 0.0) {
+        return false;
+    }
+    let candidate = HitOrder(max(in_plane.distance, entry), first_primitive + row_a.w);
+    if (!precedes((*search).after, candidate) || !precedes(candidate, (*search).before)) {
+        return false;
+    }
+    (*search).before = candidate;
+    (*search).object = object;
+    (*search).triangle = row_a.w;
+    (*search).place = place;
+    (*search).barycentric = in_plane.barycentric;
+    return true;
+}
+
+// A root as if it were the only child that was entered.
+fn root_group(root: u32) -> vec2<u32> {
+    return vec2<u32>(root, 0x80000000u);
+}
+
+// Looks for a candidate; with `any` the first one found ends the search.
+fn search_along(world: Ray, any: bool, search: ptr<function, Search>) {
+    var far_stack: array<vec2<u32>, FAR>;
+    var size = 0u;
+    // the stack's size where the object's tree begins
+    var floor_of_object = 0u;
+    var object = 0u;
+    var first_primitive = 0u;
+    var ray = traced_ray(world);
+    var in_top = !SINGLE_TREE;
+    var group: vec2<u32>;
+    // a ray from farther away than the top level was made for enters all of its children
+    var enters_all = false;
+    if (SINGLE_TREE) {
+        group = root_group(objects[0].root);
+    } else {
+        group = root_group(shot.top_node);
+        let reach = abs(world.origin);
+        enters_all = !(reach.x <= shot.top_reach && reach.y <= shot.top_reach && reach.z <= shot.top_reach);
+    }
+    if (shot.object_count == 0u || group.x == ABSENT) {
+        return;
+    }
+    loop {
+        var leaves = vec2<u32>(0u);
+        if (group.y > 0x00ffffffu) {
+            let bit = firstLeadingBit(group.y);
+            group.y &= ~(1u << bit);
+            if (group.y > 0x00ffffffu) {
+                if (size < NEAR) {
+                    near_stack[size * 64u + thread_in_group] = group;
+                } else {
+                    far_stack[min(size - NEAR, FAR - 1u)] = group;
+                }
+                size += 1u;
+            }
+            let slot = (bit - 24u) ^ ray.turn;
+            let node = group.x + countOneBits(group.y & ((1u << slot) - 1u));
+            var distance = (*search).before.distance;
+            var entered = enter(node, ray, distance);
+            if (!SINGLE_TREE && in_top && enters_all) {
+                entered = all_children(node, ray.turn);
+            }
+            group = entered.group;
+            leaves = entered.leaves;
+        } else {
+            leaves = group;
+            group = vec2<u32>(0u);
+        }
+        while (leaves.y != 0u) {
+            let bit = firstTrailingBit(leaves.y);
+            leaves.y &= leaves.y - 1u;
+            if (!SINGLE_TREE && in_top) {
+                object = tables[shot.top_objects + leaves.x + bit];
+                let entry = box_entry(object_box(object, ray.origin), ray.origin, ray.inverse);
+                if (objects[object].root == ABSENT || entry < 0.0 || entry > (*search).before.distance) {
+                    continue;
+                }
+                // what is left of this node waits
+                if (group.y > 0x00ffffffu) {
+                    if (size < NEAR) {
+                        near_stack[size * 64u + thread_in_group] = group;
+                    } else {
+                        far_stack[min(size - NEAR, FAR - 1u)] = group;
+                    }
+                    size += 1u;
+                }
+                if (leaves.y != 0u) {
+                    if (size < NEAR) {
+                        near_stack[size * 64u + thread_in_group] = leaves;
+                    } else {
+                        far_stack[min(size - NEAR, FAR - 1u)] = leaves;
+                    }
+                    size += 1u;
+                }
+                floor_of_object = size;
+                first_primitive = objects[object].first_primitive;
+                if ((objects[object].flags & PLACED) != 0u) {
+                    ray = traced_ray(object_ray(object, world));
+                }
+                in_top = false;
+                group = root_group(objects[object].root);
+                break;
+            }
+            if (test_triangle(leaves.x + bit, ray, object, first_primitive, search) && any) {
+                return;
+            }
+        }
+        if (group.y <= 0x00ffffffu) {
+            if (!SINGLE_TREE && !in_top && size == floor_of_object) {
+                in_top = true;
+                ray = traced_ray(world);
+            }
+            if (size == 0u) {
+                return;
+            }
+            size -= 1u;
+            if (size < NEAR) {
+                group = near_stack[size * 64u + thread_in_group];
+            } else {
+                group = far_stack[min(size - NEAR, FAR - 1u)];
+            }
+        }
+    }
+}
+
+// All children of a node, as if they were entered.
+fn all_children(node: u32, turn: u32) -> Entered {
+    let head = nodes[5u * node];
+    let links = nodes[5u * node + 1u];
+    let everywhere = vec4<f32>(0.0);
+    let turn4 = turn * 0x01010101u;
+    let bits = entered_bits(everywhere, everywhere, 0.0, links.z, turn4)
+        | entered_bits(everywhere, everywhere, 0.0, links.w, turn4);
+    return Entered(
+        vec2<u32>(links.x, (bits & 0xff000000u) | (head.w >> 24u)),
+        vec2<u32>(links.y, bits & 0x00ffffffu),
+    );
+}
+
+// The first candidate after a place of the order.
+fn closest(ray: Ray, after: HitOrder) -> Hit {
+    let end = HitOrder(bitcast<f32>(INFINITE_BITS), 0u);
+    var search = Search(after, end, ABSENT, 0u, 0u, vec2<f32>(0.0));
+    search_along(ray, false, &search);
+    return Hit(search.before.distance, search.object, search.triangle, search.place, search.barycentric);
+}
+
+// Whether any candidate has a distance below `end`.
+fn occluded(ray: Ray, end: f32) -> bool {
+    var search = Search(order_start(), HitOrder(end, 0u), ABSENT, 0u, 0u, vec2<f32>(0.0));
+    search_along(ray, true, &search);
+    return search.object != ABSENT;
+}
+
+// The corners of the triangle that was hit, in its object's space.
+fn corners_of(hit: Hit) -> array<vec3<f32>, 3> {
+    let row = 3u * hit.place;
+    return array<vec3<f32>, 3>(
+        bitcast<vec3<f32>>(triangles[row].xyz),
+        bitcast<vec3<f32>>(triangles[row + 1u].xyz),
+        bitcast<vec3<f32>>(triangles[row + 2u].xyz),
+    );
+}

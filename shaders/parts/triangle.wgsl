@@ -1,0 +1,64 @@
+// The canonical hit of one triangle. Twin of src/accel/triangle.rs.
+//
+// What a driver does with a + b·c is its own business, so nothing that a hit depends on leaves it a choice: a projected
+// vertex is one fused operation for each coordinate, and an edge's value is the difference of two products with the error
+// of one of them added (Kahan's), whose sign is right where fused operations are fused, and which is the plain difference
+// of the rounded products where they are not. Either way both neighbours of an edge see opposite signs or 0, and no ray
+// passes between them.
+
+// A ray as the edge test wants it: its largest component is along the last axis, the others are sheared away.
+struct ShearRay {
+    last_axis: u32,
+    // In the order of the sheared axes.
+    origin: vec3<f32>,
+    shear: vec3<f32>,
+}
+
+fn shear_ray(ray: Ray) -> ShearRay {
+    let size = abs(ray.direction);
+    var last = select(1u, 2u, size.y < size.z);
+    if (size.x >= size.y && size.x >= size.z) {
+        last = 0u;
+    }
+    let d = sheared_axes(last, ray.direction);
+    return ShearRay(last, sheared_axes(last, ray.origin), vec3<f32>(d.x / d.z, d.y / d.z, 1.0 / d.z));
+}
+
+// Coordinates in the order of the axes of the sheared space.
+fn sheared_axes(last: u32, v: vec3<f32>) -> vec3<f32> {
+    return select(select(v, v.zxy, last == 1u), v.yzx, last == 0u);
+}
+
+// A vertex as seen along the ray.
+fn project(ray: ShearRay, vertex: vec3<f32>) -> vec3<f32> {
+    let v = sheared_axes(ray.last_axis, vertex) - ray.origin;
+    return vec3<f32>(fma(-ray.shear.x, v.z, v.x), fma(-ray.shear.y, v.z, v.y), v.z);
+}
+
+// What a ray meets in a triangle's plane inside of its edges.
+struct InPlane {
+    // 0 or less where it meets nothing.
+    distance: f32,
+    barycentric: vec2<f32>,
+}
+
+fn hit_in_plane(ray: ShearRay, corner_a: vec3<f32>, corner_b: vec3<f32>, corner_c: vec3<f32>) -> InPlane {
+    let a = project(ray, corner_a);
+    let b = project(ray, corner_b);
+    let c = project(ray, corner_c);
+    let u = difference_of_products(c.x, b.y, c.y, b.x);
+    let v = difference_of_products(a.x, c.y, a.y, c.x);
+    let w = difference_of_products(b.x, a.y, b.y, a.x);
+    let is_inside = (u >= 0.0 && v >= 0.0 && w >= 0.0) || (u <= 0.0 && v <= 0.0 && w <= 0.0);
+    let determinant = (u + v) + w;
+    if (!is_inside || determinant == 0.0) {
+        return InPlane(-1.0, vec2<f32>(0.0));
+    }
+    let depth = fma(u, a.z, fma(v, b.z, w * c.z));
+    return InPlane(depth / determinant * ray.shear.z, vec2<f32>(v / determinant, w / determinant));
+}
+
+// Whether a place of the order comes before another.
+fn precedes(a: HitOrder, b: HitOrder) -> bool {
+    return a.distance < b.distance || (a.distance == b.distance && a.primitive < b.primitive);
+}

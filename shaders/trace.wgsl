@@ -1,0 +1,65 @@
+// The film: one thread takes some of a pixel's samples, the pixel's lanes are added up in the workgroup. Twin of
+// src/kernel/tile.rs.
+
+var<workgroup> lane_sums: array<vec4<f32>, 64>;
+var<workgroup> lane_albedos: array<vec3<f32>, 64>;
+
+// Every other bit of a number of up to six, from the lowest on.
+fn even_bits(number: u32) -> u32 {
+    return (number & 1u) | ((number >> 1u) & 2u) | ((number >> 2u) & 4u);
+}
+
+@compute @workgroup_size(64)
+fn trace(
+    @builtin(workgroup_id) group: vec3<u32>,
+    @builtin(num_workgroups) groups: vec3<u32>,
+    @builtin(local_invocation_index) local: u32,
+) {
+    thread_in_group = local;
+    if (HAS_BRANCHES) {
+        waiting_thread = (group.y * groups.x + group.x) * 64u + local;
+        waiting_threads = groups.x * groups.y * 64u;
+    }
+    // a group's pixels lie in Morton order in a tile that is as wide as high, or twice as wide
+    let lanes = slice.lanes;
+    let number = local / lanes;
+    let bits = countTrailingZeros(64u / lanes);
+    let pixel = vec2<u32>(
+        (group.x << ((bits + 1u) / 2u)) + even_bits(number),
+        slice.first_row + (group.y << (bits / 2u)) + even_bits(number >> 1u),
+    );
+    let is_inside = pixel.x < shot.size.x && pixel.y < min(shot.size.y, slice.end_row);
+    if (is_inside) {
+        add_samples(pixel, local % lanes, lanes);
+    }
+    lane_sums[local] = vec4<f32>(sum.rgb, sum.through);
+    if (HAS_ALBEDO) {
+        lane_albedos[local] = sum.albedo;
+    }
+    // its barriers are also those between what the lanes write above and what is read below
+    add_counts(local);
+    if (is_inside && local % lanes == 0u) {
+        let samples = f32(shot.samples);
+        let place = pixel.y * shot.size.x + pixel.x;
+        var total = lane_sums[local];
+        for (var lane = 1u; lane < lanes; lane += 1u) {
+            total += lane_sums[local + lane];
+        }
+        let mean = bitcast<vec4<u32>>(total / samples);
+        film[4u * place] = mean.x;
+        film[4u * place + 1u] = mean.y;
+        film[4u * place + 2u] = mean.z;
+        film[4u * place + 3u] = mean.w;
+        if (HAS_ALBEDO) {
+            var albedo = lane_albedos[local];
+            for (var lane = 1u; lane < lanes; lane += 1u) {
+                albedo += lane_albedos[local + lane];
+            }
+            let mean_albedo = bitcast<vec3<u32>>(albedo / samples);
+            let first = 4u * shot.size.x * shot.size.y + 3u * place;
+            film[first] = mean_albedo.x;
+            film[first + 1u] = mean_albedo.y;
+            film[first + 2u] = mean_albedo.z;
+        }
+    }
+}

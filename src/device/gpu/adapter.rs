@@ -1,0 +1,238 @@
+//! Adapters: what there is, what each lacks, and devices of them. The one place that knows what kernels need.
+
+use crate::device::DeviceError;
+use std::sync::{Arc, Mutex, PoisonError};
+
+/// Storage buffers that the kernels bind at once.
+const STORAGE_BUFFERS: u32 = 14;
+/// Threads of the largest workgroup, and bytes that they share.
+const GROUP_THREADS: u32 = 256;
+const GROUP_BYTES: u32 = 10_240;
+/// The least storage binding that is worth it.
+const BINDING_BYTES: u64 = 64 << 20;
+/// Without knowledge of an adapter's memory, this much of it is used.
+const UNKNOWN_MEMORY_BYTES: u64 = 1 << 30;
+
+/// A GPU, or a program that acts as one.
+#[derive(Clone, Debug)]
+pub struct Adapter {
+    /// Its place among the adapters: `gpu:N`.
+    pub number: usize,
+    adapter: wgpu::Adapter,
+    info: wgpu::AdapterInfo,
+    memory_bytes: Option<u64>,
+}
+
+/// The adapters of this machine, those that are hardware first.
+pub fn adapters() -> Vec<Adapter> {
+    let instance = wgpu::Instance::new(wgpu::InstanceDescriptor {
+        backends: wgpu::Backends::PRIMARY,
+        flags: flags(),
+        ..wgpu::InstanceDescriptor::new_without_display_handle()
+    });
+    let mut found = pollster::block_on(instance.enumerate_adapters(wgpu::Backends::PRIMARY));
+    // a stable sort: among equals the driver's order
+    found.sort_by_key(|adapter| rank(adapter.get_info().device_type));
+    let adapter = |(number, adapter): (usize, wgpu::Adapter)| Adapter {
+        number,
+        info: adapter.get_info(),
+        memory_bytes: memory_bytes(&adapter),
+        adapter,
+    };
+    found.into_iter().enumerate().map(adapter).collect()
+}
+
+/// Validation layers where `WGPU_VALIDATION` asks for them; else none, in debug builds neither: a test of warm frames is
+/// not one of drivers.
+fn flags() -> wgpu::InstanceFlags {
+    wgpu::InstanceFlags::empty().with_env()
+}
+
+fn rank(kind: wgpu::DeviceType) -> u32 {
+    match kind {
+        wgpu::DeviceType::DiscreteGpu => 0,
+        wgpu::DeviceType::IntegratedGpu => 1,
+        wgpu::DeviceType::VirtualGpu => 2,
+        wgpu::DeviceType::Other => 3,
+        wgpu::DeviceType::Cpu => 4,
+    }
+}
+
+/// Bytes of an adapter's own memory, where its back end tells.
+fn memory_bytes(adapter: &wgpu::Adapter) -> Option<u64> {
+    // SAFETY: the handle is only asked about, while the adapter lives.
+    let vulkan = unsafe { adapter.as_hal::<wgpu::hal::api::Vulkan>() }?;
+    let instance = vulkan.shared_instance().raw_instance();
+    // SAFETY: the physical device is the instance's, which lives as long as the adapter.
+    let memory = unsafe { instance.get_physical_device_memory_properties(vulkan.raw_physical_device()) };
+    const DEVICE_LOCAL: u32 = 1;
+    let heaps = memory.memory_heaps.iter().take(memory.memory_heap_count as usize);
+    heaps.filter(|heap| heap.flags.as_raw() & DEVICE_LOCAL != 0).map(|heap| heap.size).max()
+}
+
+impl Adapter {
+    /// Its name on the command line and in reports.
+    pub fn name(&self) -> String {
+        format!("gpu:{}", self.number)
+    }
+
+    /// Whether it is a program: used only when it is named.
+    pub fn is_software(&self) -> bool {
+        self.info.device_type == wgpu::DeviceType::Cpu
+    }
+
+    /// Its model, back end and driver.
+    pub fn description(&self) -> String {
+        let wgpu::AdapterInfo { name, backend, driver, driver_info, .. } = &self.info;
+        let kind = if self.is_software() { ", software" } else { "" };
+        format!("{name}, {backend:?}{kind}, driver {driver} {driver_info}").trim_end().to_string()
+    }
+
+    /// Bytes of its own memory, where it tells.
+    pub fn memory_bytes(&self) -> Option<u64> {
+        self.memory_bytes
+    }
+
+    /// Bytes that a device of it may hold where nothing else is said: four fifths of its memory.
+    pub fn default_budget_bytes(&self) -> u64 {
+        self.memory_bytes.map_or(UNKNOWN_MEMORY_BYTES, |bytes| bytes / 5 * 4)
+    }
+
+    /// Bytes that a buffer of it may have in a kernel.
+    pub fn binding_bytes(&self) -> u64 {
+        let limits = self.adapter.limits();
+        limits.max_storage_buffer_binding_size.min(limits.max_buffer_size)
+    }
+
+    /// Threads that run in step.
+    pub fn subgroup_sizes(&self) -> [u32; 2] {
+        [self.info.subgroup_min_size, self.info.subgroup_max_size]
+    }
+
+    /// What of it is used beyond what every adapter has.
+    pub fn features(&self) -> Vec<&'static str> {
+        let names = [
+            (wgpu::Features::MAPPABLE_PRIMARY_BUFFERS, "mapped buffers"),
+            (wgpu::Features::TIMESTAMP_QUERY, "timestamps"),
+            (wgpu::Features::PIPELINE_CACHE, "pipeline cache"),
+        ];
+        let features = self.used_features();
+        names.into_iter().filter(|(feature, _)| features.contains(*feature)).map(|(_, name)| name).collect()
+    }
+
+    fn used_features(&self) -> wgpu::Features {
+        let wanted = wgpu::Features::TIMESTAMP_QUERY
+            | wgpu::Features::TIMESTAMP_QUERY_INSIDE_ENCODERS
+            | wgpu::Features::MAPPABLE_PRIMARY_BUFFERS
+            | wgpu::Features::PIPELINE_CACHE;
+        self.adapter.features() & wanted
+    }
+
+    /// Why it cannot be used, where it cannot.
+    pub fn lacks(&self) -> Option<String> {
+        let limits = self.adapter.limits();
+        let least = [
+            (
+                "storage buffers in a kernel",
+                u64::from(limits.max_storage_buffers_per_shader_stage),
+                u64::from(STORAGE_BUFFERS),
+            ),
+            (
+                "threads in a workgroup",
+                u64::from(limits.max_compute_invocations_per_workgroup),
+                u64::from(GROUP_THREADS),
+            ),
+            (
+                "bytes that a workgroup shares",
+                u64::from(limits.max_compute_workgroup_storage_size),
+                u64::from(GROUP_BYTES),
+            ),
+            ("bytes in a storage buffer", self.binding_bytes(), BINDING_BYTES),
+        ];
+        let (what, has, needs) = least.into_iter().find(|(_, has, needs)| has < needs)?;
+        Some(format!(
+            "{}: {} has {has} {what}, {needs} are needed; another device must be used",
+            self.name(),
+            self.info.name
+        ))
+    }
+
+    /// Opens it.
+    pub(super) fn open(&self) -> Result<Gpu, DeviceError> {
+        let lost = |why: String| DeviceError::Lost { device: self.name(), why };
+        if let Some(lacks) = self.lacks() {
+            return Err(lost(lacks));
+        }
+        let request = self.adapter.request_device(&wgpu::DeviceDescriptor {
+            label: Some("rentix"),
+            required_features: self.used_features(),
+            required_limits: self.adapter.limits(),
+            memory_hints: wgpu::MemoryHints::Performance,
+            ..wgpu::DeviceDescriptor::default()
+        });
+        let (device, queue) = pollster::block_on(request).map_err(|e| lost(e.to_string()))?;
+        let trouble = Arc::new(Mutex::new(None));
+        let note = Arc::clone(&trouble);
+        device.set_device_lost_callback(move |reason, why| tell(&note, format!("{reason:?}: {why}")));
+        let note = Arc::clone(&trouble);
+        device.on_uncaptured_error(Arc::new(move |error: wgpu::Error| tell(&note, error.to_string())));
+        Ok(Gpu {
+            name: self.name(),
+            binding_bytes: self.binding_bytes(),
+            groups_most: self.adapter.limits().max_compute_workgroups_per_dimension,
+            features: self.used_features(),
+            device,
+            queue,
+            trouble,
+        })
+    }
+}
+
+/// Keeps the first trouble: what follows follows from it.
+fn tell(trouble: &Mutex<Option<String>>, why: String) {
+    trouble.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(why);
+}
+
+/// A device of an adapter, and what became of it.
+#[derive(Debug)]
+pub(super) struct Gpu {
+    pub(super) name: String,
+    pub(super) device: wgpu::Device,
+    pub(super) queue: wgpu::Queue,
+    /// Bytes of a storage buffer at most.
+    pub(super) binding_bytes: u64,
+    /// Workgroups in one direction at most.
+    pub(super) groups_most: u32,
+    pub(super) features: wgpu::Features,
+    /// Set from callbacks: a device that is lost answers every call as if nothing were wrong.
+    trouble: Arc<Mutex<Option<String>>>,
+}
+
+impl Gpu {
+    /// An error where the device is lost or refused something.
+    pub(super) fn check(&self) -> Result<(), DeviceError> {
+        match &*self.trouble.lock().unwrap_or_else(PoisonError::into_inner) {
+            None => Ok(()),
+            Some(why) => Err(DeviceError::Lost { device: self.name.clone(), why: why.clone() }),
+        }
+    }
+
+    /// Waits until all that was submitted is done.
+    pub(super) fn wait(&self) -> Result<(), DeviceError> {
+        let waited = self.device.poll(wgpu::PollType::wait_indefinitely());
+        self.check()?;
+        waited.map(|_| ()).map_err(|e| DeviceError::Lost { device: self.name.clone(), why: e.to_string() })
+    }
+
+    /// A buffer; None where there is no memory for it.
+    pub(super) fn buffer(&self, label: &str, size: u64, usage: wgpu::BufferUsages) -> Option<wgpu::Buffer> {
+        let scope = self.device.push_error_scope(wgpu::ErrorFilter::OutOfMemory);
+        let buffer = self.device.create_buffer(&wgpu::BufferDescriptor {
+            label: Some(label),
+            size,
+            usage,
+            mapped_at_creation: false,
+        });
+        pollster::block_on(scope.pop()).is_none().then_some(buffer)
+    }
+}

@@ -1,0 +1,112 @@
+//! One large buffer in which parts have places: they come and go, and the buffer grows.
+
+use super::adapter::Gpu;
+use std::collections::BTreeMap;
+use std::ops::Range;
+
+/// A buffer of so many units of equal size.
+#[derive(Debug)]
+pub(super) struct Heap {
+    label: &'static str,
+    unit_bytes: u64,
+    buffer: wgpu::Buffer,
+    /// Units that the buffer has.
+    capacity: u32,
+    /// What is free: starts and lengths, no two of them side by side.
+    free: BTreeMap<u32, u32>,
+}
+
+/// Units at first.
+const FIRST: u32 = 1024;
+
+/// Why there is no place.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Full {
+    /// Bytes that the buffer would have.
+    pub(super) needed_bytes: u64,
+    /// Bytes that it may have.
+    pub(super) most_bytes: u64,
+}
+
+impl Heap {
+    pub(super) fn new(gpu: &Gpu, label: &'static str, unit_bytes: u64) -> Result<Self, Full> {
+        let bytes = u64::from(FIRST) * unit_bytes;
+        let buffer = gpu.buffer(label, bytes, USAGE).ok_or(Full { needed_bytes: bytes, most_bytes: 0 })?;
+        Ok(Self { label, unit_bytes, buffer, capacity: FIRST, free: BTreeMap::from([(0, FIRST)]) })
+    }
+
+    pub(super) fn buffer(&self) -> &wgpu::Buffer {
+        &self.buffer
+    }
+
+    /// Bytes that the buffer has.
+    pub(super) fn bytes(&self) -> u64 {
+        u64::from(self.capacity) * self.unit_bytes
+    }
+
+    /// Takes a place of so many units: the first that is large enough, else the buffer grows.
+    pub(super) fn take(&mut self, gpu: &Gpu, units: u64) -> Result<Range<u32>, Full> {
+        let fits = |(_, length): &(&u32, &u32)| u64::from(**length) >= units;
+        let start = match self.free.iter().find(fits) {
+            Some((&start, _)) => start,
+            None => self.grow(gpu, units)?,
+        };
+        let length = self.free.remove(&start).unwrap_or(0);
+        let end = start + units as u32;
+        if start + length > end {
+            self.free.insert(end, start + length - end);
+        }
+        Ok(start..end)
+    }
+
+    /// Gives a place back.
+    pub(super) fn give(&mut self, place: Range<u32>) {
+        if place.is_empty() {
+            return;
+        }
+        let Range { mut start, mut end } = place;
+        if let Some((&before, &length)) = self.free.range(..start).next_back()
+            && before + length == start
+        {
+            self.free.remove(&before);
+            start = before;
+        }
+        if let Some(length) = self.free.remove(&end) {
+            end += length;
+        }
+        self.free.insert(start, end - start);
+    }
+
+    /// Makes the buffer larger; gives where so many units are free at its end.
+    fn grow(&mut self, gpu: &Gpu, units: u64) -> Result<u32, Full> {
+        let last = self.free.iter().next_back().map(|(&start, &length)| (start, start + length));
+        let start = last.filter(|(_, end)| *end == self.capacity).map_or(self.capacity, |(start, _)| start);
+        let needed = u64::from(start) + units;
+        let most = (gpu.binding_bytes / self.unit_bytes).min(u64::from(u32::MAX));
+        let full = Full { needed_bytes: needed * self.unit_bytes, most_bytes: most * self.unit_bytes };
+        if needed > most {
+            return Err(full);
+        }
+        // by a half at least, so that what grows bit by bit is copied a few times only
+        let wanted = (u64::from(self.capacity) * 3 / 2).max(needed).min(most);
+        let make =
+            |units: u64| gpu.buffer(self.label, units * self.unit_bytes, USAGE).map(|b| (b, units as u32));
+        let (buffer, capacity) = make(wanted).or_else(|| make(needed)).ok_or(full)?;
+        let mut encoder = gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+        encoder.copy_buffer_to_buffer(&self.buffer, 0, &buffer, 0, self.bytes());
+        gpu.queue.submit([encoder.finish()]);
+        self.give(self.capacity..capacity);
+        (self.buffer, self.capacity) = (buffer, capacity);
+        Ok(start)
+    }
+
+    /// Writes from a unit on; bytes are whole words.
+    pub(super) fn write(&self, gpu: &Gpu, start: u32, bytes: &[u8]) {
+        if !bytes.is_empty() {
+            gpu.queue.write_buffer(&self.buffer, u64::from(start) * self.unit_bytes, bytes);
+        }
+    }
+}
+
+const USAGE: wgpu::BufferUsages =
+    wgpu::BufferUsages::STORAGE.union(wgpu::BufferUsages::COPY_DST).union(wgpu::BufferUsages::COPY_SRC);

@@ -1,0 +1,245 @@
+//! GPUs: the scene lives in their memory, frames are updates.
+
+mod adapter;
+mod arena;
+mod frame;
+mod heap;
+mod pipelines;
+pub mod records;
+mod resident;
+mod scene;
+pub mod shaders;
+
+pub use adapter::{Adapter, adapters};
+
+use super::{Device, DeviceError, DeviceInfo, DeviceKind, Stop, Traced, UpdateCost};
+use crate::accel::{Aabb, PackedNode};
+use crate::clock::Stopwatch;
+use crate::plan::{Residency, UpdatePlan};
+use crate::scene::{Background, Frame, Geometry, PartHash, Shot, Texture};
+use adapter::Gpu;
+use frame::{Buffers, Ground};
+use pipelines::Pipelines;
+use rayon::{ThreadPool, ThreadPoolBuilder};
+use resident::{Means, Resident};
+use scene::Records;
+use std::collections::HashMap;
+use std::ops::Range;
+
+/// A GPU that renders.
+#[derive(Debug)]
+pub struct GpuDevice {
+    info: DeviceInfo,
+    adapter: Adapter,
+    /// Builds trees.
+    pool: ThreadPool,
+    /// None once it was lost, until it is opened again.
+    open: Option<Open>,
+    /// What a lost one holds.
+    nothing: Residency,
+}
+
+/// A device that is open, and all that is on it.
+#[derive(Debug)]
+struct Open {
+    gpu: Gpu,
+    pipelines: Pipelines,
+    resident: Resident,
+    buffers: Buffers,
+    background: Option<(PartHash, Range<u32>)>,
+    /// The boxes of positions that were asked for in this frame or the one before.
+    boxes: HashMap<PartHash, Aabb>,
+}
+
+impl GpuDevice {
+    /// Opens an adapter; trees are built by so many threads (0: one for each core). It may hold so many bytes.
+    ///
+    /// # Errors
+    /// [`DeviceError::Lost`] where the adapter lacks something, cannot be opened, or there are no threads.
+    pub fn new(adapter: &Adapter, threads: usize, budget_bytes: u64) -> Result<Self, DeviceError> {
+        let no_threads =
+            |e: rayon::ThreadPoolBuildError| DeviceError::Lost { device: adapter.name(), why: e.to_string() };
+        let pool = ThreadPoolBuilder::new()
+            .num_threads(threads)
+            .thread_name(|i| format!("gpu-build-{i}"))
+            .build()
+            .map_err(no_threads)?;
+        let info = DeviceInfo {
+            name: adapter.name(),
+            kind: DeviceKind::Gpu,
+            description: adapter.description(),
+            threads: pool.current_num_threads(),
+            budget_bytes,
+        };
+        let mut device =
+            Self { info, adapter: adapter.clone(), pool, open: None, nothing: Residency::default() };
+        device.opened()?;
+        Ok(device)
+    }
+
+    /// Loses the device as a driver might, for tests.
+    pub fn lose(&self) {
+        if let Some(open) = &self.open {
+            open.gpu.device.destroy();
+        }
+    }
+
+    fn opened(&mut self) -> Result<&mut Open, DeviceError> {
+        if self.open.is_none() {
+            let gpu = self.adapter.open()?;
+            let pipelines = Pipelines::new(&gpu);
+            let full = |full: heap::Full| DeviceError::OutOfMemory {
+                device: self.info.name.clone(),
+                needed_bytes: full.needed_bytes,
+                budget_bytes: full.most_bytes,
+            };
+            let resident = Resident::new(&gpu).map_err(full)?;
+            gpu.check()?;
+            let (buffers, boxes) = (Buffers::default(), HashMap::new());
+            self.open = Some(Open { gpu, pipelines, resident, buffers, background: None, boxes });
+        }
+        match &mut self.open {
+            Some(open) => Ok(open),
+            None => {
+                Err(DeviceError::Lost { device: self.info.name.clone(), why: "it is not open".to_string() })
+            }
+        }
+    }
+
+    /// Forgets a device that is lost: what it held is gone.
+    fn settled<T>(&mut self, done: Result<T, DeviceError>) -> Result<T, DeviceError> {
+        if matches!(done, Err(DeviceError::Lost { .. })) {
+            self.open = None;
+        }
+        done
+    }
+
+    fn apply_here(&mut self, plan: &UpdatePlan, frame: &Frame) -> Result<UpdateCost, DeviceError> {
+        self.opened()?;
+        let Self { open: Some(open), pool, info, .. } = self else { return Ok(UpdateCost::default()) };
+        // what was to be fitted stands where parts may now be overwritten
+        open.fit_now()?;
+        let means = Means { gpu: &open.gpu, pool, info };
+        let cost = open.resident.apply(plan, frame, &means)?;
+        open.gpu.check()?;
+        Ok(cost)
+    }
+
+    fn trace_here(&mut self, frame: &Frame, shot: &Shot, stop: &Stop) -> Result<Traced, DeviceError> {
+        let start = Stopwatch::start();
+        self.opened()?;
+        let Self { open: Some(open), pool, info, .. } = self else { return Err(DeviceError::Stopped) };
+        if stop.asked() {
+            return Err(DeviceError::Stopped);
+        }
+        let background = match &shot.background {
+            Background::Color(_) => None,
+            Background::Picture { texture, .. } => Some(open.background(texture.hash(), texture, info)?),
+        };
+        let before = std::mem::take(&mut open.boxes);
+        let mut boxes = HashMap::new();
+        let box_of = |geometry: &Geometry| {
+            let name = geometry.positions.hash();
+            let make = || resident::world_box(&geometry.positions.0, pool);
+            *boxes.entry(name).or_insert_with(|| before.get(&name).copied().unwrap_or_else(make))
+        };
+        let not_resident = |object| DeviceError::NotResident { device: info.name.clone(), object };
+        let mut records =
+            Records::new(frame, shot, &open.resident, background, box_of).map_err(not_resident)?;
+        open.boxes = boxes;
+        let top = open.place_top(&mut records, info)?;
+        let fits = std::mem::take(&mut open.resident.fits);
+        open.buffers.make_boxes(&open.gpu, &fits)?;
+        let traced = open.ground().trace(fits, &records, shot, stop);
+        open.resident.heaps.nodes.give(top);
+        let (film, rays) = traced?;
+        Ok(Traced { film, rays, trace_ms: start.ms(), readback_ms: None })
+    }
+}
+
+impl Open {
+    fn ground(&mut self) -> Ground<'_> {
+        Ground {
+            gpu: &self.gpu,
+            pipelines: &mut self.pipelines,
+            heaps: &self.resident.heaps,
+            buffers: &mut self.buffers,
+        }
+    }
+
+    fn fit_now(&mut self) -> Result<(), DeviceError> {
+        let fits = std::mem::take(&mut self.resident.fits);
+        self.buffers.make_boxes(&self.gpu, &fits)?;
+        self.ground().fit_only(fits)
+    }
+
+    /// Where the texels of a background picture begin; it is sent where it is another than before.
+    fn background(
+        &mut self,
+        name: PartHash,
+        texture: &Texture,
+        info: &DeviceInfo,
+    ) -> Result<u32, DeviceError> {
+        if let Some((held, place)) = &self.background
+            && *held == name
+        {
+            return Ok(place.start);
+        }
+        let texels = &mut self.resident.heaps.texels;
+        if let Some((_, place)) = self.background.take() {
+            texels.give(place);
+        }
+        let bytes = resident::texels(texture);
+        let full = |full: heap::Full| DeviceError::OutOfMemory {
+            device: info.name.clone(),
+            needed_bytes: full.needed_bytes,
+            budget_bytes: full.most_bytes,
+        };
+        let place = texels.take(&self.gpu, bytes.len() as u64 / 4).map_err(full)?;
+        texels.write(&self.gpu, place.start, bytes);
+        self.background = Some((name, place.clone()));
+        Ok(place.start)
+    }
+
+    /// Puts the level above a frame's objects among the nodes.
+    fn place_top(&mut self, records: &mut Records, info: &DeviceInfo) -> Result<Range<u32>, DeviceError> {
+        if records.top.is_empty() {
+            return Ok(0..0);
+        }
+        let full = |full: heap::Full| DeviceError::OutOfMemory {
+            device: info.name.clone(),
+            needed_bytes: full.needed_bytes,
+            budget_bytes: full.most_bytes,
+        };
+        let nodes = &mut self.resident.heaps.nodes;
+        let place = nodes.take(&self.gpu, records.top.len() as u64).map_err(full)?;
+        let moved: Vec<PackedNode> = records
+            .top
+            .iter()
+            .map(|node| PackedNode { child_base: node.child_base + place.start, ..*node })
+            .collect();
+        nodes.write(&self.gpu, place.start, bytemuck::cast_slice(&moved));
+        records.shot.top_node = place.start;
+        Ok(place)
+    }
+}
+
+impl Device for GpuDevice {
+    fn info(&self) -> &DeviceInfo {
+        &self.info
+    }
+
+    fn residency(&self) -> &Residency {
+        self.open.as_ref().map_or(&self.nothing, |open| &open.resident.residency)
+    }
+
+    fn apply(&mut self, plan: &UpdatePlan, frame: &Frame) -> Result<UpdateCost, DeviceError> {
+        let done = self.apply_here(plan, frame);
+        self.settled(done)
+    }
+
+    fn trace(&mut self, frame: &Frame, shot: &Shot, stop: &Stop) -> Result<Traced, DeviceError> {
+        let done = self.trace_here(frame, shot, stop);
+        self.settled(done)
+    }
+}

@@ -1,0 +1,149 @@
+//! Kernels made ready: layouts of bindings, and a pipeline for each set of what frames have.
+
+use super::adapter::Gpu;
+use super::scene::Has;
+use super::shaders;
+use std::collections::HashMap;
+
+/// Bindings of kernels that trace: which are uniform, and which is bound at an offset given with each dispatch.
+const TRACE_BINDINGS: u32 = 16;
+const SHOT: u32 = 0;
+const SLICE: u32 = 1;
+/// The first binding that kernels write to.
+const FILM: u32 = 13;
+
+/// All that was made ready yet.
+#[derive(Debug)]
+pub(super) struct Pipelines {
+    pub(super) trace_layout: wgpu::BindGroupLayout,
+    pub(super) refit_layout: wgpu::BindGroupLayout,
+    trace_pipelines: wgpu::PipelineLayout,
+    trace_module: wgpu::ShaderModule,
+    center_module: Option<wgpu::ShaderModule>,
+    pub(super) refit_level: wgpu::ComputePipeline,
+    pub(super) refit_top: wgpu::ComputePipeline,
+    made: HashMap<(Kernel, Has), wgpu::ComputePipeline>,
+}
+
+/// A kernel that traces.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub(super) enum Kernel {
+    /// The picture.
+    Trace,
+    /// Auxiliary pictures of the rays through the pixels' centres.
+    Center,
+}
+
+impl Pipelines {
+    pub(super) fn new(gpu: &Gpu) -> Self {
+        let trace_layout = layout(gpu, "trace", TRACE_BINDINGS, |binding| match binding {
+            SHOT => (wgpu::BufferBindingType::Uniform, false),
+            SLICE => (wgpu::BufferBindingType::Uniform, true),
+            _ => (storage(binding < FILM), false),
+        });
+        let refit_layout = layout(gpu, "refit", 6, |binding| match binding {
+            0 => (wgpu::BufferBindingType::Uniform, true),
+            _ => (storage(binding < 3), false),
+        });
+        let pipelines = |label: &str, layout: &wgpu::BindGroupLayout| {
+            gpu.device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
+                label: Some(label),
+                bind_group_layouts: &[Some(layout)],
+                immediate_size: 0,
+            })
+        };
+        let trace_pipelines = pipelines("trace", &trace_layout);
+        let refit_pipelines = pipelines("refit", &refit_layout);
+        let refit = module(gpu, "refit", &shaders::refit());
+        let fit = |entry: &str| pipeline(gpu, &refit_pipelines, &refit, entry, &[]);
+        Self {
+            refit_level: fit("refit_level"),
+            refit_top: fit("refit_top"),
+            trace_module: module(gpu, "trace", &shaders::trace()),
+            center_module: None,
+            trace_layout,
+            refit_layout,
+            trace_pipelines,
+            made: HashMap::new(),
+        }
+    }
+
+    /// The pipeline for frames that have this.
+    pub(super) fn tracing(&mut self, gpu: &Gpu, kernel: Kernel, has: Has) -> &wgpu::ComputePipeline {
+        let Self { trace_pipelines, trace_module, center_module, made, .. } = self;
+        made.entry((kernel, has)).or_insert_with(|| {
+            let (module, entry) = match kernel {
+                Kernel::Trace => (&*trace_module, "trace"),
+                Kernel::Center => {
+                    let make = || module(gpu, "center", &shaders::center());
+                    (&*center_module.get_or_insert_with(make), "center")
+                }
+            };
+            pipeline(gpu, trace_pipelines, module, entry, &constants(has))
+        })
+    }
+}
+
+fn constants(has: Has) -> [(&'static str, f64); 7] {
+    [
+        ("SINGLE_TREE", has.single_tree),
+        ("HAS_BRANCHES", has.branches),
+        ("HAS_TEXTURES", has.textures),
+        ("HAS_AREA_LIGHT", has.area_light),
+        ("HAS_TRANSPARENCY", has.transparency),
+        ("GOES_ON", has.goes_on),
+        ("HAS_ALBEDO", has.albedo),
+    ]
+    .map(|(name, is_set)| (name, f64::from(u8::from(is_set))))
+}
+
+fn storage(read_only: bool) -> wgpu::BufferBindingType {
+    wgpu::BufferBindingType::Storage { read_only }
+}
+
+fn layout(
+    gpu: &Gpu,
+    label: &str,
+    bindings: u32,
+    kind: impl Fn(u32) -> (wgpu::BufferBindingType, bool),
+) -> wgpu::BindGroupLayout {
+    let entry = |binding: u32| {
+        let (ty, has_dynamic_offset) = kind(binding);
+        wgpu::BindGroupLayoutEntry {
+            binding,
+            visibility: wgpu::ShaderStages::COMPUTE,
+            ty: wgpu::BindingType::Buffer { ty, has_dynamic_offset, min_binding_size: None },
+            count: None,
+        }
+    };
+    let entries: Vec<_> = (0..bindings).map(entry).collect();
+    gpu.device
+        .create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label: Some(label), entries: &entries })
+}
+
+fn module(gpu: &Gpu, label: &str, text: &str) -> wgpu::ShaderModule {
+    gpu.device.create_shader_module(wgpu::ShaderModuleDescriptor {
+        label: Some(label),
+        source: wgpu::ShaderSource::Wgsl(text.into()),
+    })
+}
+
+fn pipeline(
+    gpu: &Gpu,
+    layout: &wgpu::PipelineLayout,
+    module: &wgpu::ShaderModule,
+    entry: &str,
+    constants: &[(&str, f64)],
+) -> wgpu::ComputePipeline {
+    gpu.device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
+        label: Some(entry),
+        layout: Some(layout),
+        module,
+        entry_point: Some(entry),
+        compilation_options: wgpu::PipelineCompilationOptions {
+            constants,
+            zero_initialize_workgroup_memory: false,
+        },
+        cache: None,
+    })
+}

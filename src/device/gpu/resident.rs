@@ -1,0 +1,452 @@
+//! What a GPU holds: parts and trees at places of its heaps.
+
+use super::adapter::Gpu;
+use super::heap::{Full, Heap};
+use super::records::{ABSENT, RefitTree};
+use crate::accel::{Aabb, NODE_BYTES, PackedNode, PackedTree, Quality, TRIANGLE_BYTES};
+use crate::clock::Stopwatch;
+use crate::device::{DeviceError, DeviceInfo, UpdateCost};
+use crate::math::LINEAR_FROM_SRGB8;
+use crate::plan::{Residency, Step, TreeState, UpdatePlan, tree_name};
+use crate::scene::{Frame, Geometry, PartHash, Texels, Texture, Triangles};
+use rayon::ThreadPool;
+use rayon::prelude::*;
+use std::collections::HashMap;
+use std::ops::Range;
+
+/// Nodes that one workgroup fits height after height, at most.
+const TOP_NODES: u32 = 256;
+/// Triangles whose vertices one thread looks up together.
+const GRAIN: usize = 4096;
+
+/// The buffers that parts and trees have places in.
+#[derive(Debug)]
+pub(super) struct Heaps {
+    /// Nodes of trees, [`NODE_BYTES`] each.
+    pub(super) nodes: Heap,
+    /// Triangles of leaves, [`TRIANGLE_BYTES`] each.
+    pub(super) triangles: Heap,
+    /// Indices and attributes, by words.
+    pub(super) words: Heap,
+    /// The linear values of sRGB's codes, then texels, by words.
+    pub(super) texels: Heap,
+}
+
+impl Heaps {
+    pub(super) fn new(gpu: &Gpu) -> Result<Self, Full> {
+        let mut heaps = Self {
+            nodes: Heap::new(gpu, "nodes", NODE_BYTES)?,
+            triangles: Heap::new(gpu, "triangles", TRIANGLE_BYTES)?,
+            words: Heap::new(gpu, "words", 4)?,
+            texels: Heap::new(gpu, "texels", 4)?,
+        };
+        let table = heaps.texels.take(gpu, LINEAR_FROM_SRGB8.len() as u64)?;
+        heaps.texels.write(gpu, table.start, bytemuck::cast_slice(&*LINEAR_FROM_SRGB8));
+        Ok(heaps)
+    }
+}
+
+/// Where a part is.
+#[derive(Clone, Debug, PartialEq, Eq)]
+enum Place {
+    Words(Range<u32>),
+    Texels(Range<u32>),
+    /// Kernels do not read it.
+    Host,
+}
+
+/// A tree at its places.
+#[derive(Debug)]
+pub(super) struct GpuTree {
+    nodes: Range<u32>,
+    triangles: Range<u32>,
+    vertices: Range<u32>,
+    /// Nodes by height, then the starts of heights and an end.
+    lists: Range<u32>,
+    heights: Vec<Range<u32>>,
+    /// For each place of a leaf the triangle's number.
+    order: Vec<u32>,
+    /// The triangles that its vertices are those of.
+    corners: PartHash,
+}
+
+impl GpuTree {
+    /// Its root in the nodes, and the first of its triangles.
+    pub(super) fn root(&self) -> (u32, u32) {
+        if self.nodes.is_empty() { (ABSENT, 0) } else { (self.nodes.start, self.triangles.start) }
+    }
+}
+
+/// A tree that is to be fitted before the next frame is traced.
+#[derive(Clone, Debug)]
+pub(super) struct Fit {
+    pub(super) record: RefitTree,
+    pub(super) nodes: u32,
+    /// Heights that are dispatches of their own.
+    pub(super) below_top: Vec<Range<u32>>,
+}
+
+/// Parts and trees.
+#[derive(Debug)]
+pub(super) struct Resident {
+    pub(super) residency: Residency,
+    pub(super) heaps: Heaps,
+    parts: HashMap<PartHash, Place>,
+    trees: HashMap<PartHash, GpuTree>,
+    /// Fits that were not submitted yet.
+    pub(super) fits: Vec<Fit>,
+}
+
+/// What an update needs beside what is held.
+pub(super) struct Means<'a> {
+    pub(super) gpu: &'a Gpu,
+    pub(super) pool: &'a ThreadPool,
+    pub(super) info: &'a DeviceInfo,
+}
+
+impl Means<'_> {
+    fn out_of_memory(&self, needed_bytes: u64, budget_bytes: u64) -> DeviceError {
+        DeviceError::OutOfMemory { device: self.info.name.clone(), needed_bytes, budget_bytes }
+    }
+}
+
+impl Resident {
+    pub(super) fn new(gpu: &Gpu) -> Result<Self, Full> {
+        Ok(Self {
+            residency: Residency::default(),
+            heaps: Heaps::new(gpu)?,
+            parts: HashMap::new(),
+            trees: HashMap::new(),
+            fits: Vec::new(),
+        })
+    }
+
+    /// Applies a plan that was made for this frame and for what is held. Refuses before anything is changed where what is
+    /// needed does not fit the budget, or a buffer that the adapter allows.
+    pub(super) fn apply(
+        &mut self,
+        plan: &UpdatePlan,
+        frame: &Frame,
+        means: &Means,
+    ) -> Result<UpdateCost, DeviceError> {
+        let needed_bytes = plan.needed_bytes(&self.residency);
+        if needed_bytes > means.info.budget_bytes {
+            return Err(means.out_of_memory(needed_bytes, means.info.budget_bytes));
+        }
+        refuse_beyond_bindings(frame, means)?;
+        let mut of_frame: HashMap<PartHash, &Geometry> = HashMap::new();
+        for object in &frame.objects {
+            of_frame.extend(object.geometry.parts().into_iter().map(|(name, _)| (name, &*object.geometry)));
+        }
+        self.residency.begin();
+        let mut cost = UpdateCost::default();
+        let start = Stopwatch::start();
+        for step in &plan.steps {
+            match *step {
+                Step::Free { name } => {
+                    self.forget(name);
+                    self.residency.free(name);
+                }
+                Step::Evict { name } => {
+                    self.forget(name);
+                    self.residency.evict(name);
+                }
+                Step::Keep { name } => self.residency.keep(name),
+                Step::Upload { part, bytes } => {
+                    cost.uploaded_bytes += bytes;
+                    if let Some(geometry) = of_frame.get(&part) {
+                        let place = self.upload(part, geometry, means)?;
+                        self.parts.insert(part, place);
+                    }
+                    self.residency.hold(part, bytes);
+                }
+                Step::Refit { from, tree: name, object, .. } => {
+                    let Some(object) = frame.objects.get(object) else { continue };
+                    let geometry = &object.geometry;
+                    let refitted = Stopwatch::start();
+                    let Some(mut tree) = self.trees.remove(&from) else { continue };
+                    if tree.corners != geometry.triangles.hash() {
+                        tree.corners = geometry.triangles.hash();
+                        let vertices = vertices(&tree.order, &geometry.triangles, means.pool);
+                        self.heaps.words.write(
+                            means.gpu,
+                            tree.vertices.start,
+                            bytemuck::cast_slice(&vertices),
+                        );
+                    }
+                    let cost_before = self.residency.trees.get(&from).map_or(0.0, |s| s.cost);
+                    self.residency.refit(from, name, geometry, cost_before);
+                    self.trees.insert(name, tree);
+                    self.fit(name, geometry);
+                    cost.refitted.add(geometry.triangles.0.len() as u64, refitted.ms());
+                }
+                Step::Build { tree: name, object, .. } => {
+                    let Some(object) = frame.objects.get(object) else { continue };
+                    let built = Stopwatch::start();
+                    self.build(name, &object.geometry, means)?;
+                    cost.built.add(object.geometry.triangles.0.len() as u64, built.ms());
+                }
+            }
+        }
+        self.residency.end(&plan.again);
+        let update_ms = cost.built.ms + cost.refitted.ms;
+        cost.upload_ms = Some(start.ms() - update_ms);
+        cost.update_ms = Some(update_ms);
+        cost.cost_ratio = self.residency.cost_ratio();
+        Ok(cost)
+    }
+
+    fn upload(&mut self, part: PartHash, geometry: &Geometry, means: &Means) -> Result<Place, DeviceError> {
+        if let Some(texture) = geometry.textures().find(|t| t.hash() == part) {
+            let bytes = texels(texture);
+            let place = self.take(means, |heaps| &mut heaps.texels, bytes.len() as u64 / 4)?;
+            self.heaps.texels.write(means.gpu, place.start, bytes);
+            return Ok(Place::Texels(place));
+        }
+        let Some(bytes) = words(part, geometry) else { return Ok(Place::Host) };
+        let place = self.take(means, |heaps| &mut heaps.words, bytes.len() as u64 / 4)?;
+        self.heaps.words.write(means.gpu, place.start, bytes);
+        Ok(Place::Words(place))
+    }
+
+    /// A place in a heap; where there is none, what no frame needs now is given up, and it is tried once more.
+    fn take(
+        &mut self,
+        means: &Means,
+        heap: fn(&mut Heaps) -> &mut Heap,
+        units: u64,
+    ) -> Result<Range<u32>, DeviceError> {
+        if let Ok(place) = heap(&mut self.heaps).take(means.gpu, units) {
+            return Ok(place);
+        }
+        for idle in self.residency.idle() {
+            self.forget(idle);
+            self.residency.evict(idle);
+        }
+        let full = |full: Full| means.out_of_memory(full.needed_bytes, full.most_bytes);
+        heap(&mut self.heaps).take(means.gpu, units).map_err(full)
+    }
+
+    fn build(&mut self, name: PartHash, geometry: &Geometry, means: &Means) -> Result<(), DeviceError> {
+        let (positions, triangles) = (&geometry.positions.0, &geometry.triangles);
+        let packed = means.pool.install(|| PackedTree::build(positions, &triangles.0, Quality::default()));
+        let bytes = packed.device_bytes();
+        // many small objects may need more than the estimate
+        if self.residency.bytes() + bytes > means.info.budget_bytes {
+            for idle in self.residency.idle() {
+                self.forget(idle);
+                self.residency.evict(idle);
+                if self.residency.bytes() + bytes <= means.info.budget_bytes {
+                    break;
+                }
+            }
+        }
+        let needed_bytes = self.residency.bytes() + bytes;
+        if needed_bytes > means.info.budget_bytes {
+            return Err(means.out_of_memory(needed_bytes, means.info.budget_bytes));
+        }
+        let cost = packed.cost;
+        let tree = self.place(packed, triangles.hash(), &vertices_of(triangles), means)?;
+        self.residency.hold_tree(name, bytes, TreeState::built(geometry, cost));
+        self.trees.insert(name, tree);
+        self.fit(name, geometry);
+        Ok(())
+    }
+
+    /// Puts a tree's shape into the heaps.
+    fn place(
+        &mut self,
+        packed: PackedTree,
+        corners: PartHash,
+        vertices: &dyn Fn(&[u32], &ThreadPool) -> Vec<[u32; 4]>,
+        means: &Means,
+    ) -> Result<GpuTree, DeviceError> {
+        let PackedTree { mut nodes, order, by_height, heights, .. } = packed;
+        let place_nodes = self.take(means, |heaps| &mut heaps.nodes, nodes.len() as u64)?;
+        let place_triangles = self.take(means, |heaps| &mut heaps.triangles, order.len() as u64)?;
+        let place_vertices = self.take(means, |heaps| &mut heaps.words, 4 * order.len() as u64)?;
+        let mut lists = by_height;
+        lists.extend(heights.iter().map(|h| h.start));
+        lists.extend(heights.last().map(|h| h.end));
+        let place_lists = self.take(means, |heaps| &mut heaps.words, lists.len() as u64)?;
+        move_nodes(&mut nodes, place_nodes.start, place_triangles.start);
+        let gpu = means.gpu;
+        self.heaps.nodes.write(gpu, place_nodes.start, bytemuck::cast_slice(&nodes));
+        let vertices = vertices(&order, means.pool);
+        self.heaps.words.write(gpu, place_vertices.start, bytemuck::cast_slice(&vertices));
+        self.heaps.words.write(gpu, place_lists.start, bytemuck::cast_slice(&lists));
+        Ok(GpuTree {
+            nodes: place_nodes,
+            triangles: place_triangles,
+            vertices: place_vertices,
+            lists: place_lists,
+            heights,
+            order,
+            corners,
+        })
+    }
+
+    /// Asks for a fit of a tree to a geometry's positions before the next frame is traced.
+    fn fit(&mut self, name: PartHash, geometry: &Geometry) {
+        let (Some(tree), Some(positions)) = (self.trees.get(&name), self.words_of(geometry.positions.hash()))
+        else {
+            return;
+        };
+        if tree.nodes.is_empty() {
+            return;
+        }
+        // the nodes from this height on are few
+        let last = tree.heights.last().map_or(0, |h| h.end);
+        let top = tree.heights.iter().position(|h| last - h.start <= TOP_NODES).unwrap_or(tree.heights.len());
+        let record = RefitTree {
+            positions,
+            vertices: tree.vertices.start,
+            by_height: tree.lists.start,
+            heights: tree.lists.start + last,
+            height_count: tree.heights.len() as u32,
+            top_height: top as u32,
+            first_node: tree.nodes.start,
+            first_triangle: tree.triangles.start,
+            first_box: 0,
+            pad_a: 0,
+            pad_b: 0,
+            pad_c: 0,
+        };
+        let below_top = tree.heights[..top].to_vec();
+        self.fits.push(Fit { record, nodes: last, below_top });
+    }
+
+    fn forget(&mut self, name: PartHash) {
+        match self.parts.remove(&name) {
+            Some(Place::Words(place)) => self.heaps.words.give(place),
+            Some(Place::Texels(place)) => self.heaps.texels.give(place),
+            Some(Place::Host) | None => {}
+        }
+        if let Some(tree) = self.trees.remove(&name) {
+            self.heaps.nodes.give(tree.nodes);
+            self.heaps.triangles.give(tree.triangles);
+            self.heaps.words.give(tree.vertices);
+            self.heaps.words.give(tree.lists);
+        }
+    }
+
+    /// Where a part's words begin.
+    pub(super) fn words_of(&self, part: PartHash) -> Option<u32> {
+        match self.parts.get(&part)? {
+            Place::Words(place) => Some(place.start),
+            _ => None,
+        }
+    }
+
+    /// Where a texture's texels begin.
+    pub(super) fn texels_of(&self, part: PartHash) -> Option<u32> {
+        match self.parts.get(&part)? {
+            Place::Texels(place) => Some(place.start),
+            _ => None,
+        }
+    }
+
+    /// The tree over a geometry.
+    pub(super) fn tree(&self, geometry: &Geometry) -> Option<&GpuTree> {
+        self.trees.get(&tree_name(geometry))
+    }
+}
+
+fn vertices_of(triangles: &Triangles) -> impl Fn(&[u32], &ThreadPool) -> Vec<[u32; 4]> {
+    move |order, pool| vertices(order, triangles, pool)
+}
+
+/// For each place of a leaf the vertices of its triangle, and its number.
+fn vertices(order: &[u32], triangles: &Triangles, pool: &ThreadPool) -> Vec<[u32; 4]> {
+    let of = |&number: &u32| {
+        let [a, b, c] = triangles.0[number as usize];
+        [a, b, c, number]
+    };
+    pool.install(|| order.par_iter().with_min_len(GRAIN).map(of).collect())
+}
+
+/// Counts a tree's nodes and triangles from the heaps' beginnings.
+fn move_nodes(nodes: &mut [PackedNode], first_node: u32, first_triangle: u32) {
+    for node in nodes {
+        node.child_base += first_node;
+        node.triangle_base += first_triangle;
+    }
+}
+
+/// The words of a part that kernels read.
+fn words(part: PartHash, geometry: &Geometry) -> Option<&[u8]> {
+    let Geometry { positions, triangles, texcoords, normals, colors, material_runs, .. } = geometry;
+    if part == positions.hash() {
+        return Some(bytemuck::cast_slice(&positions.0));
+    }
+    if part == triangles.hash() {
+        return Some(bytemuck::cast_slice(&triangles.0));
+    }
+    if part == material_runs.hash() {
+        return Some(bytemuck::cast_slice(&material_runs.0));
+    }
+    if let Some(a) = texcoords {
+        if part == a.values.hash() {
+            return Some(bytemuck::cast_slice(&a.values.0));
+        }
+        if part == a.corners.hash() {
+            return Some(bytemuck::cast_slice(&a.corners.0));
+        }
+    }
+    if let Some(a) = normals {
+        if part == a.values.hash() {
+            return Some(bytemuck::cast_slice(&a.values.0));
+        }
+        if part == a.corners.hash() {
+            return Some(bytemuck::cast_slice(&a.corners.0));
+        }
+    }
+    colors.as_ref().filter(|c| part == c.hash()).map(|c| bytemuck::cast_slice(&c.0))
+}
+
+/// The texels as the device has them.
+pub(super) fn texels(texture: &Texture) -> &[u8] {
+    match &texture.texels {
+        Texels::U8(texels) => bytemuck::cast_slice(texels),
+        Texels::F32(texels) => bytemuck::cast_slice(texels),
+    }
+}
+
+/// Refuses a frame of which one kind of data does not fit the largest buffer that the adapter allows.
+fn refuse_beyond_bindings(frame: &Frame, means: &Means) -> Result<(), DeviceError> {
+    let mut seen = HashMap::new();
+    let (mut triangles, mut words_bytes, mut texels_bytes) = (0_u64, 0_u64, 0_u64);
+    for object in &frame.objects {
+        let geometry = &*object.geometry;
+        for (name, bytes) in geometry.parts() {
+            if seen.insert(name, ()).is_none() {
+                if words(name, geometry).is_some() {
+                    words_bytes += bytes;
+                } else if geometry.textures().any(|t| t.hash() == name) {
+                    texels_bytes += bytes;
+                }
+            }
+        }
+        if seen.insert(tree_name(geometry), ()).is_none() {
+            triangles += geometry.triangles.0.len() as u64;
+        }
+    }
+    // by triangle: its vertices and number, and a share of the lists of nodes
+    let largest = [triangles * TRIANGLE_BYTES, words_bytes + triangles * 20, texels_bytes].into_iter().max();
+    match largest {
+        Some(bytes) if bytes > means.gpu.binding_bytes => {
+            Err(means.out_of_memory(bytes, means.gpu.binding_bytes))
+        }
+        _ => Ok(()),
+    }
+}
+
+/// The box of what is finite of some positions, a little larger than any triangle's own box.
+pub(super) fn world_box(positions: &[[f32; 3]], pool: &ThreadPool) -> Aabb {
+    let finite = |p: &&[f32; 3]| p.iter().all(|x| x.is_finite());
+    let point = |p: &[f32; 3]| Aabb { min: *p, max: *p };
+    let union = |a: Aabb, b: Aabb| a.union(&b);
+    pool.install(|| {
+        positions.par_iter().with_min_len(GRAIN).filter(finite).map(point).reduce(|| Aabb::EMPTY, union)
+    })
+}
