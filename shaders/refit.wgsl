@@ -39,6 +39,8 @@ struct RefitLevel {
 @group(0) @binding(4) var<storage, read_write> triangles: array<vec4<u32>>;
 // For each node two rows: the least corner, and the half surfaces of all boxes below it; the greatest corner.
 @group(0) @binding(5) var<storage, read_write> boxes: array<vec4<f32>>;
+// For each tree its surface-area cost.
+@group(0) @binding(6) var<storage, read_write> costs: array<f32>;
 
 const GROUP: u32 = 256u;
 const NODES_IN_GROUP: u32 = 32u;
@@ -258,5 +260,11 @@ fn refit_top(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_
             workgroupBarrier();
         }
         storageBarrier();
+    }
+    if (thread == 0u) {
+        let at = 2u * tree.first_box;
+        let low = boxes[at];
+        let whole = half_area(Aabb(low.xyz, boxes[at + 1u].xyz));
+        costs[level.tree + group.x] = select(0.0, low.w / whole, whole > 0.0);
     }
 }

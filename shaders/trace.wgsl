@@ -9,6 +9,23 @@ fn even_bits(number: u32) -> u32 {
     return (number & 1u) | ((number >> 1u) & 2u) | ((number >> 2u) & 4u);
 }
 
+// The code of linear light: how many of the least floats of codes are not above it. What is not a number has code 0. Floats
+// of 0 and more stand in the order of their bits.
+fn code_of(x: f32) -> u32 {
+    if (!(x > 0.0)) {
+        return 0u;
+    }
+    let bits = bitcast<u32>(min(x, 1.0));
+    var code = 0u;
+    for (var step = 128u; step > 0u; step /= 2u) {
+        // of 255 steps the last one asked for is number 254
+        if (tables[shot.code_steps + code + step - 1u] <= bits) {
+            code += step;
+        }
+    }
+    return code;
+}
+
 @compute @workgroup_size(64)
 fn trace(
     @builtin(workgroup_id) group: vec3<u32>,
@@ -44,6 +61,11 @@ fn trace(
         var total = lane_sums[local];
         for (var lane = 1u; lane < lanes; lane += 1u) {
             total += lane_sums[local + lane];
+        }
+        if (MAKES_CODES) {
+            let shown = total.xyz / samples * shot.gain;
+            film[place] = code_of(shown.x) | (code_of(shown.y) << 8u) | (code_of(shown.z) << 16u);
+            return;
         }
         let mean = bitcast<vec4<u32>>(total / samples);
         film[4u * place] = mean.x;

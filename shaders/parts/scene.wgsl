@@ -45,6 +45,10 @@ struct ShotConstants {
     top_objects: u32,
     // For each material its place in the order of first use: from here on in `tables`.
     material_slots: u32,
+    // The factor of the exposure, and where in `tables` the least floats of codes 1 to 255 stand, for kernels that make codes.
+    gain: f32,
+    code_steps: u32,
+    pad: vec2<u32>,
 }
 
 // Which part of the picture one dispatch traces.
@@ -206,7 +210,7 @@ const REFLECTION_CUBE: u32 = 2u;
 // The linear values of the 256 codes of sRGB as floats, then texels.
 @group(0) @binding(12) var<storage, read> texels: array<u32>;
 // What kernels write: four words a pixel (linear RGB, what the background counts for), then, where it is asked for, the
-// albedo, three words a pixel; and the auxiliary pictures of the centre.
+// albedo, three words a pixel; or one word of codes a pixel; or the auxiliary pictures of the centre.
 @group(0) @binding(13) var<storage, read_write> film: array<u32>;
 // Rays that wait, for kernels with models beyond 2.
 @group(0) @binding(14) var<storage, read_write> waiting: array<vec4<u32>>;
@@ -222,6 +226,8 @@ override HAS_TRANSPARENCY: bool = true;
 // Whether rays go straight on through some surface.
 override GOES_ON: bool = true;
 override HAS_ALBEDO: bool = true;
+// Whether the film is made of codes of 8 bits on the sRGB curve.
+override MAKES_CODES: bool = false;
 
 struct Ray {
     origin: vec3<f32>,

@@ -1,7 +1,7 @@
 //! The fake device: keeps its residency as a real one does, draws a film that tells which frame it is, and fails as it
 //! is told. For tests of what stands above devices.
 
-use super::{Device, DeviceError, DeviceInfo, DeviceKind, RayCounts, Stop, Traced, UpdateCost};
+use super::{Device, DeviceError, DeviceInfo, DeviceKind, Output, RayCounts, Stop, Traced, UpdateCost};
 use crate::film::Film;
 use crate::plan::{Residency, Step, TREE_BYTES_PER_TRIANGLE, TreeState, UpdatePlan, tree_name};
 use crate::scene::{Background, Frame, Object, PartHash, Shot};
@@ -25,6 +25,8 @@ pub struct FakeDevice {
     residency: Residency,
     faults: BTreeMap<PartHash, Fault>,
     is_lost: bool,
+    /// The frame that was begun.
+    traced: Option<Traced>,
 }
 
 impl FakeDevice {
@@ -37,7 +39,7 @@ impl FakeDevice {
             threads: 1,
             budget_bytes,
         };
-        Self { info, residency: Residency::default(), faults: BTreeMap::new(), is_lost: false }
+        Self { info, residency: Residency::default(), faults: BTreeMap::new(), is_lost: false, traced: None }
     }
 
     /// Makes a frame, named by [`Frame::hash`], fail.
@@ -116,7 +118,7 @@ impl Device for FakeDevice {
         Ok(UpdateCost { uploaded_bytes, ..UpdateCost::default() })
     }
 
-    fn trace(&mut self, frame: &Frame, shot: &Shot, stop: &Stop) -> Result<Traced, DeviceError> {
+    fn begin(&mut self, frame: &Frame, shot: &Shot, _output: Output, stop: &Stop) -> Result<(), DeviceError> {
         self.check_lost()?;
         match self.faults.get(&frame.hash()) {
             Some(Fault::Panic) => panic!("{}: scripted panic", self.info.name),
@@ -136,7 +138,19 @@ impl Device for FakeDevice {
         }
         let mut film = Film::new(shot.size, shot.alpha, shot.aovs);
         film.rgb.fill(color_of(frame, shot));
-        Ok(Traced { film, rays: RayCounts::default(), trace_ms: 0.0, readback_ms: None })
+        self.traced = Some(Traced {
+            film,
+            rays: RayCounts::default(),
+            trace_ms: 0.0,
+            update_ms: None,
+            readback_ms: None,
+        });
+        Ok(())
+    }
+
+    fn finish(&mut self) -> Result<Traced, DeviceError> {
+        let why = "no frame was begun".to_string();
+        self.traced.take().ok_or_else(|| DeviceError::Lost { device: self.info.name.clone(), why })
     }
 }
 

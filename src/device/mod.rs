@@ -101,6 +101,18 @@ impl Work {
     }
 }
 
+/// What is wanted of a film's colour.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Output {
+    /// Linear floats.
+    Linear,
+    /// Codes of 8 bits, where the device can make them; the film has linear floats else.
+    Codes {
+        /// Exposure in stops.
+        exposure_stops: f32,
+    },
+}
+
 /// A traced frame and what it cost.
 #[derive(Debug)]
 pub struct Traced {
@@ -110,6 +122,8 @@ pub struct Traced {
     pub rays: RayCounts,
     /// Tracing and shading, ms.
     pub trace_ms: f64,
+    /// Fitting trees for this frame, ms, where the device does that when it traces.
+    pub update_ms: Option<f64>,
     /// Bringing the film back, ms; None where it need not be.
     pub readback_ms: Option<f64>,
 }
@@ -162,6 +176,20 @@ pub trait Device: Send {
     /// have been made for this frame and for what the device holds now.
     fn apply(&mut self, plan: &UpdatePlan, frame: &Frame) -> Result<UpdateCost, DeviceError>;
 
-    /// Traces the frame that is resident.
-    fn trace(&mut self, frame: &Frame, shot: &Shot, stop: &Stop) -> Result<Traced, DeviceError>;
+    /// Frames that may be under way at once: begun, and not finished.
+    fn most_under_way(&self) -> usize {
+        1
+    }
+
+    /// Begins to trace the frame that is resident. The next frame may be made resident at once.
+    fn begin(&mut self, frame: &Frame, shot: &Shot, output: Output, stop: &Stop) -> Result<(), DeviceError>;
+
+    /// Waits for the frame that was begun first of those under way. Where the device is lost, all of them are.
+    fn finish(&mut self) -> Result<Traced, DeviceError>;
+
+    /// Traces the frame that is resident; nothing else may be under way.
+    fn trace(&mut self, frame: &Frame, shot: &Shot, stop: &Stop) -> Result<Traced, DeviceError> {
+        self.begin(frame, shot, Output::Linear, stop)?;
+        self.finish()
+    }
 }

@@ -72,8 +72,15 @@ impl Srgb8 {
         &TABLE
     }
 
+    /// The bits of the least float of each code from 1 to 255.
+    pub fn steps() -> &'static [u32; 255] {
+        static STEPS: LazyLock<[u32; 255]> =
+            LazyLock::new(|| std::array::from_fn(|i| least_with_code(i as u8 + 1).to_bits()));
+        &STEPS
+    }
+
     fn new() -> Self {
-        let steps: Vec<u32> = (1..=255).map(|code| least_with_code(code).to_bits()).collect();
+        let steps = Self::steps();
         Self(std::array::from_fn(|i| {
             let least = (FIRST_BUCKET + i as u32) << BUCKET_SHIFT;
             let code = steps.partition_point(|&step| step <= least);

@@ -5,15 +5,20 @@ pub mod compare;
 mod flip;
 pub mod quantize;
 
+pub use color::{Srgb8, gain_from_stops};
+
 use crate::scene::{Aov, AovSet};
+use std::borrow::Cow;
 
 /// A linear float picture with its auxiliary pictures; rows from the top.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Film {
     /// Width and height in pixels.
     pub size: [u32; 2],
-    /// Linear RGB, premultiplied where alpha is there.
+    /// Linear RGB, premultiplied where alpha is there; empty where there are codes.
     pub rgb: Vec<[f32; 3]>,
+    /// RGB of 8 bits on the sRGB curve after exposure, three bytes a pixel, where a device made them.
+    pub codes: Option<Vec<u8>>,
     /// Coverage, where it was asked for.
     pub alpha: Option<Vec<f32>>,
     /// Auxiliary pictures.
@@ -57,12 +62,29 @@ impl Aovs {
 }
 
 impl Film {
+    /// A film of codes, three bytes a pixel.
+    pub fn of_codes(size: [u32; 2], codes: Vec<u8>) -> Self {
+        Self { size, rgb: Vec::new(), codes: Some(codes), alpha: None, aovs: Aovs::default() }
+    }
+
+    /// RGB of 8 bits on the sRGB curve, RGBA with straight colour where there is alpha and it is wanted.
+    pub fn codes(&self, with_alpha: bool, exposure_stops: f32) -> Cow<'_, [u8]> {
+        match &self.codes {
+            Some(codes) => Cow::Borrowed(codes),
+            None => {
+                let alpha = self.alpha.as_deref().filter(|_| with_alpha);
+                Cow::Owned(quantize::quantize8(&self.rgb, alpha, exposure_stops))
+            }
+        }
+    }
+
     /// A black film with room for what is asked.
     pub fn new(size: [u32; 2], alpha: bool, aovs: AovSet) -> Self {
         let n = size[0] as usize * size[1] as usize;
         Self {
             size,
             rgb: vec![[0.0; 3]; n],
+            codes: None,
             alpha: alpha.then(|| vec![0.0; n]),
             aovs: Aovs {
                 depth: aovs.contains(Aov::Depth).then(|| vec![f32::INFINITY; n]),

@@ -128,6 +128,12 @@ pub struct Encoding {
 }
 
 impl Encoding {
+    /// Whether the colour of a picture is made of codes of 8 bits alone.
+    pub fn takes_codes(self) -> bool {
+        let luma = matches!(self.format, Format::Pgm | Format::Pbm);
+        !self.format.line().linear && self.bits == Bits::Eight && !luma
+    }
+
     /// Adds to a fingerprint what bears on the files' bytes.
     pub fn hash_into(self, h: &mut PartHasher) {
         h.bytes(self.format.word().as_bytes());
@@ -170,7 +176,7 @@ pub fn picture_files(
 ) -> Result<Vec<PictureFile>, OutputError> {
     let line = encoding.format.line();
     let refused = |format| move |why| OutputError::Encode { format, size: film.size, why };
-    if film.rgb.is_empty() {
+    if film.rgb.is_empty() && film.codes.is_none() {
         return Err(refused(line.words[0])("it has no pixels".into()));
     }
     let bytes = (line.encode)(film, encoding).map_err(refused(line.words[0]))?;

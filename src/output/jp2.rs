@@ -3,7 +3,7 @@
 
 use super::encoding::{Bits, Encoding};
 use crate::film::Film;
-use crate::film::quantize::{quantize8, quantize16};
+use crate::film::quantize::quantize16;
 use openjp2::openjpeg::{
     OPJ_CODEC_JP2, opj_stream_set_seek_function, opj_stream_set_skip_function, opj_stream_set_user_data,
     opj_stream_set_write_function, opj_stream_t,
@@ -17,7 +17,7 @@ pub(super) fn encode(film: &Film, encoding: Encoding) -> Result<Vec<u8>, String>
     let [width, height] = film.size;
     let stops = encoding.exposure_stops;
     let (bits, samples): (u32, Vec<i32>) = match encoding.bits {
-        Bits::Eight => (8, quantize8(&film.rgb, None, stops).into_iter().map(i32::from).collect()),
+        Bits::Eight => (8, film.codes(false, stops).iter().copied().map(i32::from).collect()),
         Bits::Sixteen => (16, quantize16(&film.rgb, None, stops).into_iter().map(i32::from).collect()),
     };
     let component = opj_image_comptparm {

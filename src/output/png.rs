@@ -2,14 +2,14 @@
 
 use super::encoding::{Bits, Encoding};
 use crate::film::Film;
-use crate::film::quantize::{quantize8, quantize16};
+use crate::film::quantize::quantize16;
 
 /// RGB or RGBA with 8 or 16 bits a channel.
 pub(super) fn encode(film: &Film, encoding: Encoding) -> Result<Vec<u8>, String> {
     let (alpha, stops) = (film.alpha.as_deref(), encoding.exposure_stops);
     let (depth, rows) = match encoding.bits {
-        Bits::Eight => (png::BitDepth::Eight, quantize8(&film.rgb, alpha, stops)),
-        Bits::Sixteen => (png::BitDepth::Sixteen, big_endian(&quantize16(&film.rgb, alpha, stops))),
+        Bits::Eight => (png::BitDepth::Eight, film.codes(true, stops)),
+        Bits::Sixteen => (png::BitDepth::Sixteen, big_endian(&quantize16(&film.rgb, alpha, stops)).into()),
     };
     let mut bytes = Vec::new();
     let mut encoder = png::Encoder::new(&mut bytes, film.size[0], film.size[1]);

@@ -4,13 +4,13 @@
 use super::encoding::{Bits, Encoding};
 use super::png::big_endian;
 use crate::film::Film;
-use crate::film::quantize::{luma8, luma16, quantize8, quantize16};
+use crate::film::quantize::{luma8, luma16, quantize16};
 
 /// Colour.
 pub(super) fn encode_ppm(film: &Film, encoding: Encoding) -> Vec<u8> {
     let stops = encoding.exposure_stops;
     let (max, rows) = match encoding.bits {
-        Bits::Eight => (255, quantize8(&film.rgb, None, stops)),
+        Bits::Eight => (255, film.codes(false, stops).into_owned()),
         Bits::Sixteen => (65535, big_endian(&quantize16(&film.rgb, None, stops))),
     };
     with_header(&format!("P6\n{} {}\n{max}\n", film.size[0], film.size[1]), rows)

@@ -3,14 +3,14 @@
 
 use super::encoding::Encoding;
 use crate::film::Film;
-use crate::film::quantize::quantize8;
 use image::codecs::{bmp, jpeg, qoi, tga, webp};
 use image::{ExtendedColorType, ImageEncoder, ImageResult};
+use std::borrow::Cow;
 use std::io::Cursor;
 
 /// JPEG without alpha; colour as fine as brightness (4:4:4).
 pub(super) fn encode_jpeg(film: &Film, encoding: Encoding) -> Result<Vec<u8>, String> {
-    let rows = quantize8(&film.rgb, None, encoding.exposure_stops);
+    let rows = film.codes(false, encoding.exposure_stops);
     written(|out| {
         let encoder = jpeg::JpegEncoder::new_with_quality(out, encoding.quality);
         encoder.write_image(&rows, film.size[0], film.size[1], ExtendedColorType::Rgb8)
@@ -19,7 +19,7 @@ pub(super) fn encode_jpeg(film: &Film, encoding: Encoding) -> Result<Vec<u8>, St
 
 /// BMP without alpha, which few readers of it expect.
 pub(super) fn encode_bmp(film: &Film, encoding: Encoding) -> Result<Vec<u8>, String> {
-    let rows = quantize8(&film.rgb, None, encoding.exposure_stops);
+    let rows = film.codes(false, encoding.exposure_stops);
     written(|out| {
         let encoder = bmp::BmpEncoder::new(out);
         encoder.write_image(&rows, film.size[0], film.size[1], ExtendedColorType::Rgb8)
@@ -48,9 +48,9 @@ pub(super) fn encode_qoi(film: &Film, encoding: Encoding) -> Result<Vec<u8>, Str
 }
 
 /// RGB or, where the film has alpha, RGBA with straight colour.
-fn eight_bits(film: &Film, encoding: Encoding) -> (Vec<u8>, ExtendedColorType) {
+fn eight_bits(film: &Film, encoding: Encoding) -> (Cow<'_, [u8]>, ExtendedColorType) {
     let color = if film.alpha.is_some() { ExtendedColorType::Rgba8 } else { ExtendedColorType::Rgb8 };
-    (quantize8(&film.rgb, film.alpha.as_deref(), encoding.exposure_stops), color)
+    (film.codes(true, encoding.exposure_stops), color)
 }
 
 fn written(write: impl FnOnce(&mut Cursor<Vec<u8>>) -> ImageResult<()>) -> Result<Vec<u8>, String> {

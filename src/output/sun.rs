@@ -2,7 +2,6 @@
 
 use super::encoding::Encoding;
 use crate::film::Film;
-use crate::film::quantize::quantize8;
 
 const MAGIC: u32 = 0x59a6_6a95;
 /// Uncompressed, blue first.
@@ -18,7 +17,7 @@ pub(super) fn encode(film: &Film, encoding: Encoding) -> Result<Vec<u8>, String>
     for word in [MAGIC, width, height, 24, length, STANDARD, 0, 0] {
         out.extend(word.to_be_bytes());
     }
-    for row in quantize8(&film.rgb, None, encoding.exposure_stops).chunks(3 * width as usize) {
+    for row in film.codes(false, encoding.exposure_stops).chunks(3 * width as usize) {
         for rgb in row.chunks(3) {
             out.extend(rgb.iter().rev());
         }

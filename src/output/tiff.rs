@@ -2,7 +2,7 @@
 
 use super::encoding::{Bits, Encoding};
 use crate::film::Film;
-use crate::film::quantize::{quantize8, quantize16};
+use crate::film::quantize::quantize16;
 use std::io::Cursor;
 use tiff::TiffResult;
 use tiff::encoder::colortype::{ColorType, RGB8, RGB16};
@@ -13,7 +13,7 @@ use tiff::tags::ExtraSamples;
 pub(super) fn encode(film: &Film, encoding: Encoding) -> Result<Vec<u8>, String> {
     let (alpha, stops) = (film.alpha.as_deref(), encoding.exposure_stops);
     match encoding.bits {
-        Bits::Eight => write::<RGB8>(film, &quantize8(&film.rgb, alpha, stops)),
+        Bits::Eight => write::<RGB8>(film, &film.codes(true, stops)),
         Bits::Sixteen => write::<RGB16>(film, &quantize16(&film.rgb, alpha, stops)),
     }
     .map_err(|e| e.to_string())

@@ -7,20 +7,21 @@ use super::read::{Read, ReadFrame};
 use super::report::DeviceReport;
 use super::{Note, RunOptions, Shown, panic_text};
 use crate::clock::Stopwatch;
-use crate::device::{Device, DeviceError, Stop};
+use crate::device::{Device, DeviceError, Output, Stop, Traced, UpdateCost};
 use crate::diff::changes;
 use crate::film::Film;
 use crate::kernel::media::MEDIA_MAX;
 use crate::plan::{Action, Update, Wishes, plan_frame};
 use crate::scene::{Frame, PartHash};
 use crate::warning::Warnings;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, VecDeque};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
 use std::sync::Arc;
-use std::sync::mpsc::{Receiver, Sender, SyncSender};
+use std::sync::mpsc::{Receiver, Sender, SyncSender, TryRecvError};
 
-/// Takes frames in their order, makes each resident, traces it and hands the film to a writer.
+/// Takes frames in their order, makes each resident, traces it and hands the film to a writer. As many frames are under way
+/// as the device takes; where no other is read yet, the first of them is waited for.
 #[allow(clippy::too_many_arguments, reason = "the stage's ends")]
 pub(super) fn device_stage(
     device: &mut dyn Device,
@@ -34,7 +35,9 @@ pub(super) fn device_stage(
 ) {
     let mut stage = DeviceStage {
         told: DeviceReport::new(device.info()),
+        most_under_way: if options.cold { 1 } else { device.most_under_way() },
         device,
+        under_way: VecDeque::new(),
         before: None,
         cold: options.cold,
         update: options.update,
@@ -42,48 +45,59 @@ pub(super) fn device_stage(
         frames_left: frames as u64,
         forget: false,
         warnings: Warnings::default(),
+        ends: Ends { flight, stop, to_writers, note },
     };
     let mut waiting = BTreeMap::new();
     let mut turn = 0;
-    for read in from_readers {
-        waiting.insert(read.index, read);
+    loop {
+        let read = if stage.under_way.is_empty() {
+            from_readers.recv().map_err(|_| TryRecvError::Disconnected)
+        } else {
+            from_readers.try_recv()
+        };
+        match read {
+            Ok(read) => {
+                waiting.insert(read.index, read);
+            }
+            Err(TryRecvError::Empty) => {
+                stage.finish_first();
+                continue;
+            }
+            Err(TryRecvError::Disconnected) => break,
+        }
         while let Some(Read { bytes, outcome, .. }) = waiting.remove(&turn) {
             turn += 1;
             stage.frames_left = (frames - turn.min(frames)) as u64;
             flight.give_slot();
-            let traced = match outcome {
-                _ if stop.asked() => None,
+            match outcome {
+                _ if stop.asked() => flight.give_bytes(bytes),
                 Err(report) => {
+                    flight.give_bytes(bytes);
                     let _ = note.send(Note::Frame(report));
-                    None
                 }
-                Ok(mut read) => Some((stage.frame(&mut read, stop), read)),
-            };
-            flight.give_bytes(bytes);
-            if !stage.warnings.is_empty() {
-                let _ = note.send(Note::Warnings(std::mem::take(&mut stage.warnings)));
+                Ok(read) => stage.take(read, bytes),
             }
-            let Some((film, mut read)) = traced else { continue };
-            match film {
-                Ok((film, status)) => {
-                    // the writers outlive this stage
-                    let _ = to_writers.send(Shown { film, read, status });
-                }
-                Err(None) => {}
-                Err(Some(error)) => {
-                    read.report.status = Status::Failed;
-                    read.report.error = Some(error);
-                    let _ = note.send(Note::Frame(read.report));
-                }
-            }
-            let _ = note.send(Note::Device(stage.told.clone()));
         }
     }
+    while !stage.under_way.is_empty() {
+        stage.finish_first();
+    }
+}
+
+/// Where a frame goes from here.
+struct Ends<'a> {
+    flight: &'a InFlight,
+    stop: &'a Stop,
+    to_writers: &'a SyncSender<Shown>,
+    note: &'a Sender<Note>,
 }
 
 struct DeviceStage<'a> {
     device: &'a mut dyn Device,
     told: DeviceReport,
+    most_under_way: usize,
+    /// Frames that were begun, the first one first.
+    under_way: VecDeque<UnderWay>,
     /// What the device traced last.
     before: Option<Before>,
     cold: bool,
@@ -95,56 +109,168 @@ struct DeviceStage<'a> {
     forget: bool,
     /// What is to be told of the frame.
     warnings: Warnings,
+    ends: Ends<'a>,
 }
 
-/// A frame and what came of it.
+/// A frame that was begun.
+struct UnderWay {
+    read: ReadFrame,
+    /// Bytes of the host's memory, until it has left this stage.
+    bytes: u64,
+    cost: UpdateCost,
+}
+
+/// A frame, and what came of it: None while it is under way.
 struct Before {
     frame: Arc<Frame>,
     fingerprint: PartHash,
-    film: Arc<Film>,
+    film: Option<Arc<Film>>,
+}
+
+/// Why there is no film: an error of the device, or the text of a panic.
+enum Failure {
+    Device(DeviceError),
+    Panic(String),
+}
+
+impl Failure {
+    fn is_lost(&self) -> bool {
+        matches!(self, Self::Device(DeviceError::Lost { .. }))
+    }
 }
 
 impl DeviceStage<'_> {
-    /// The film, or why there is none; no reason means that the run was stopped.
-    fn frame(&mut self, read: &mut ReadFrame, stop: &Stop) -> Result<(Arc<Film>, Status), Option<String>> {
+    /// Begins a frame; before that finishes others, where the device takes no more.
+    fn take(&mut self, mut read: ReadFrame, bytes: u64) {
         let is_copy = |before: &&Before| before.fingerprint == read.fingerprint;
-        if let Some(before) = self.before.as_ref().filter(|_| !self.cold).filter(is_copy) {
-            let report = &mut read.report;
-            report.warm = true;
-            report.change = changes(Some(&before.frame), &read.frame);
-            let why = "equal to the frame before, as are its settings".to_string();
-            report.update =
-                UpdateReport { action: Some(Action::None.word()), why, ..UpdateReport::default() };
-            return Ok((Arc::clone(&before.film), Status::Copied));
+        if self.before.as_ref().filter(|_| !self.cold).filter(is_copy).is_some() {
+            while !self.under_way.is_empty() {
+                self.finish_first();
+            }
+            // unless it failed
+            if let Some(Before { frame, film: Some(film), .. }) = &self.before {
+                let report = &mut read.report;
+                report.warm = true;
+                report.change = changes(Some(frame), &read.frame);
+                let why = "equal to the frame before, as are its settings".to_string();
+                report.update =
+                    UpdateReport { action: Some(Action::None.word()), why, ..UpdateReport::default() };
+                let film = Arc::clone(film);
+                return self.shown(film, Status::Copied, read, bytes);
+            }
         }
+        self.begin(read, bytes, true);
+        while self.under_way.len() >= self.most_under_way {
+            self.finish_first();
+        }
+    }
+
+    /// Makes a frame resident and begins to trace it.
+    fn begin(&mut self, mut read: ReadFrame, bytes: u64, may_retry: bool) {
         let busy = Stopwatch::start();
         read.report.device = Some(self.told.name.clone());
-        let traced = catch_unwind(AssertUnwindSafe(|| self.update_and_trace(read, stop)));
-        let source = &read.report.source;
+        let begun = caught("tracing", || self.update_and_begin(&mut read));
         self.told.busy_s += busy.s();
         self.told.holds(self.device);
-        let failed = match traced {
-            Ok(Ok(film)) => {
-                self.told.frames += 1;
-                let film = Arc::new(film);
+        match begun {
+            Ok(cost) => {
                 let (frame, fingerprint) = (Arc::clone(&read.frame), read.fingerprint);
-                self.before = Some(Before { frame, fingerprint, film: Arc::clone(&film) });
+                self.before = Some(Before { frame, fingerprint, film: None });
                 self.forget = false;
-                return Ok((film, Status::Rendered));
+                self.under_way.push_back(UnderWay { read, bytes, cost });
             }
-            Ok(Err(DeviceError::Stopped)) => return Err(None),
-            Ok(Err(error)) => {
+            Err(failure) => {
+                let frame = UnderWay { read, bytes, cost: UpdateCost::default() };
+                if may_retry && failure.is_lost() {
+                    let mut lost = std::mem::take(&mut self.under_way);
+                    lost.push_back(frame);
+                    return self.retry(lost);
+                }
+                self.failed(failure, frame);
+            }
+        }
+    }
+
+    /// Waits for the frame that was begun first, and hands on its film.
+    fn finish_first(&mut self) {
+        self.finish(true);
+    }
+
+    fn finish(&mut self, may_retry: bool) {
+        let Some(mut first) = self.under_way.pop_front() else { return };
+        let busy = Stopwatch::start();
+        let traced = caught("tracing", || self.device.finish());
+        self.told.busy_s += busy.s();
+        self.told.holds(self.device);
+        match traced {
+            Ok(traced) => {
+                self.told.frames += 1;
+                self.learn(&mut first, &traced);
+                let film = Arc::new(traced.film);
+                if let Some(before) = &mut self.before
+                    && before.fingerprint == first.read.fingerprint
+                {
+                    before.film = Some(Arc::clone(&film));
+                }
+                self.shown(film, Status::Rendered, first.read, first.bytes);
+            }
+            Err(failure) if may_retry && failure.is_lost() => {
+                let mut lost = std::mem::take(&mut self.under_way);
+                lost.push_front(first);
+                self.retry(lost);
+            }
+            Err(failure) => self.failed(failure, first),
+        }
+    }
+
+    /// The device was lost, and with it all frames that were under way: each is tried once more, one at a time.
+    fn retry(&mut self, lost: VecDeque<UnderWay>) {
+        self.before = None;
+        self.forget = true;
+        for UnderWay { read, bytes, .. } in lost {
+            self.begin(read, bytes, false);
+            while !self.under_way.is_empty() {
+                self.finish(false);
+            }
+        }
+    }
+
+    fn failed(&mut self, failure: Failure, frame: UnderWay) {
+        self.before = None;
+        self.forget = true;
+        let UnderWay { mut read, bytes, .. } = frame;
+        self.ends.flight.give_bytes(bytes);
+        let source = &read.report.source;
+        let error = match failure {
+            Failure::Device(DeviceError::Stopped) => return self.tell(),
+            Failure::Device(error) => {
                 read.report.device_failed = true;
                 format!("{source}: {error}")
             }
-            Err(panic) => format!("{source}: {}", panic_text("tracing", &*panic)),
+            Failure::Panic(text) => format!("{source}: {text}"),
         };
-        self.before = None;
-        self.forget = true;
-        Err(Some(failed))
+        self.tell();
+        read.report.status = Status::Failed;
+        read.report.error = Some(error);
+        let _ = self.ends.note.send(Note::Frame(read.report));
     }
 
-    fn update_and_trace(&mut self, read: &mut ReadFrame, stop: &Stop) -> Result<Film, DeviceError> {
+    fn shown(&mut self, film: Arc<Film>, status: Status, read: ReadFrame, bytes: u64) {
+        self.ends.flight.give_bytes(bytes);
+        self.tell();
+        // the writers outlive this stage
+        let _ = self.ends.to_writers.send(Shown { film, read, status });
+    }
+
+    /// Tells of the device and of what was noticed.
+    fn tell(&mut self) {
+        if !self.warnings.is_empty() {
+            let _ = self.ends.note.send(Note::Warnings(std::mem::take(&mut self.warnings)));
+        }
+        let _ = self.ends.note.send(Note::Device(self.told.clone()));
+    }
+
+    fn update_and_begin(&mut self, read: &mut ReadFrame) -> Result<UpdateCost, DeviceError> {
         let report = &mut read.report;
         let clock = Stopwatch::start();
         let cold = self.cold || self.forget;
@@ -161,8 +287,24 @@ impl DeviceStage<'_> {
         let plan = plan_frame(&read.frame, self.device.residency(), &wishes);
         let cost = self.device.apply(&plan, &read.frame)?;
         report.updated(&plan, &cost);
-        let traced = self.device.trace(&read.frame, &read.shot, stop)?;
-        self.learned.frame(&cost, traced.trace_ms);
+        let exposure_stops = read.encoding.exposure_stops;
+        let output =
+            if read.encoding.takes_codes() { Output::Codes { exposure_stops } } else { Output::Linear };
+        self.device.begin(&read.frame, &read.shot, output, self.ends.stop)?;
+        Ok(cost)
+    }
+
+    /// Learns from a frame that was traced, and reports it.
+    fn learn(&mut self, frame: &mut UnderWay, traced: &Traced) {
+        let UnderWay { read, cost, .. } = frame;
+        let report = &mut read.report;
+        if let Some(ms) = traced.update_ms {
+            report.ms.update = Some(cost.update_ms.unwrap_or(0.0) + ms);
+            if cost.built.triangles == 0 {
+                cost.refitted.ms = ms;
+            }
+        }
+        self.learned.frame(cost, traced.trace_ms);
         if traced.rays.media_ignored > 0 {
             let text =
                 format!("rays entered more than {MEDIA_MAX} media one in another; deeper ones are ignored");
@@ -172,6 +314,13 @@ impl DeviceStage<'_> {
         report.rays = traced.rays.into();
         report.ms.trace = Some(traced.trace_ms);
         report.ms.readback = traced.readback_ms;
-        Ok(traced.film)
+    }
+}
+
+/// What a call into a device gives, be it a panic.
+fn caught<T>(what: &str, call: impl FnOnce() -> Result<T, DeviceError>) -> Result<T, Failure> {
+    match catch_unwind(AssertUnwindSafe(call)) {
+        Ok(done) => done.map_err(Failure::Device),
+        Err(panic) => Err(Failure::Panic(panic_text(what, &*panic))),
     }
 }

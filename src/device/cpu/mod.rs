@@ -3,7 +3,7 @@
 mod resident;
 mod trace;
 
-use super::{Device, DeviceError, DeviceInfo, DeviceKind, Stop, Traced, UpdateCost};
+use super::{Device, DeviceError, DeviceInfo, DeviceKind, Output, Stop, Traced, UpdateCost};
 use crate::accel::Width;
 use crate::plan::{Residency, UpdatePlan};
 use crate::scene::{Frame, Shot};
@@ -19,6 +19,8 @@ pub struct CpuDevice {
     pool: ThreadPool,
     resident: Resident,
     width: Width,
+    /// The frame that was begun: it is traced at once.
+    traced: Option<Traced>,
 }
 
 impl CpuDevice {
@@ -38,7 +40,7 @@ impl CpuDevice {
             threads,
             budget_bytes,
         };
-        Ok(Self { info, pool, resident: Resident::default(), width })
+        Ok(Self { info, pool, resident: Resident::default(), width, traced: None })
     }
 
     /// Takes the shapes of a run's first trees from a store, and puts them into it.
@@ -71,12 +73,18 @@ impl Device for CpuDevice {
         self.resident.apply(plan, frame, &self.pool, &self.info)
     }
 
-    fn trace(&mut self, frame: &Frame, shot: &Shot, stop: &Stop) -> Result<Traced, DeviceError> {
+    fn begin(&mut self, frame: &Frame, shot: &Shot, _output: Output, stop: &Stop) -> Result<(), DeviceError> {
         let scene = self
             .resident
             .scene(frame)
             .map_err(|object| DeviceError::NotResident { device: self.info.name.clone(), object })?
             .with_width(self.width);
-        self.pool.install(|| trace::trace(&scene, frame, shot, stop))
+        self.traced = Some(self.pool.install(|| trace::trace(&scene, frame, shot, stop))?);
+        Ok(())
+    }
+
+    fn finish(&mut self) -> Result<Traced, DeviceError> {
+        let why = "no frame was begun".to_string();
+        self.traced.take().ok_or_else(|| DeviceError::Lost { device: self.info.name.clone(), why })
     }
 }

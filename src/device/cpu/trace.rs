@@ -31,7 +31,7 @@ pub(super) fn trace(
             Some(sum)
         })
         .ok_or(DeviceError::Stopped)?;
-    Ok(Traced { film, rays, trace_ms: start.ms(), readback_ms: None })
+    Ok(Traced { film, rays, trace_ms: start.ms(), update_ms: None, readback_ms: None })
 }
 
 /// Tile after tile; None where it was stopped.

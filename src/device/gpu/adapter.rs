@@ -21,6 +21,8 @@ pub struct Adapter {
     adapter: wgpu::Adapter,
     info: wgpu::AdapterInfo,
     memory_bytes: Option<u64>,
+    /// Features that are there but not used.
+    unused: wgpu::Features,
 }
 
 /// The adapters of this machine, those that are hardware first.
@@ -38,6 +40,7 @@ pub fn adapters() -> Vec<Adapter> {
         info: adapter.get_info(),
         memory_bytes: memory_bytes(&adapter),
         adapter,
+        unused: wgpu::Features::empty(),
     };
     found.into_iter().enumerate().map(adapter).collect()
 }
@@ -125,7 +128,14 @@ impl Adapter {
             | wgpu::Features::TIMESTAMP_QUERY_INSIDE_ENCODERS
             | wgpu::Features::MAPPABLE_PRIMARY_BUFFERS
             | wgpu::Features::PIPELINE_CACHE;
-        self.adapter.features() & wanted
+        self.adapter.features() & wanted & !self.unused
+    }
+
+    /// The same as if it had nothing beyond what every adapter has, for tests.
+    #[must_use]
+    pub fn plain(mut self) -> Self {
+        self.unused = wgpu::Features::all();
+        self
     }
 
     /// Why it cannot be used, where it cannot.
@@ -220,6 +230,14 @@ impl Gpu {
     /// Waits until all that was submitted is done.
     pub(super) fn wait(&self) -> Result<(), DeviceError> {
         let waited = self.device.poll(wgpu::PollType::wait_indefinitely());
+        self.check()?;
+        waited.map(|_| ()).map_err(|e| DeviceError::Lost { device: self.name.clone(), why: e.to_string() })
+    }
+
+    /// Waits until a submission is done, and those before it.
+    pub(super) fn wait_for(&self, submission: wgpu::SubmissionIndex) -> Result<(), DeviceError> {
+        let poll = wgpu::PollType::Wait { submission_index: Some(submission), timeout: None };
+        let waited = self.device.poll(poll);
         self.check()?;
         waited.map(|_| ()).map_err(|e| DeviceError::Lost { device: self.name.clone(), why: e.to_string() })
     }

@@ -2,6 +2,9 @@
 
 mod adapter;
 mod arena;
+mod cuts;
+mod film;
+mod fits;
 mod frame;
 mod heap;
 mod pipelines;
@@ -12,18 +15,19 @@ pub mod shaders;
 
 pub use adapter::{Adapter, adapters};
 
-use super::{Device, DeviceError, DeviceInfo, DeviceKind, Stop, Traced, UpdateCost};
+use super::{Device, DeviceError, DeviceInfo, DeviceKind, Output, Stop, Traced, UpdateCost};
 use crate::accel::{Aabb, PackedNode};
 use crate::clock::Stopwatch;
 use crate::plan::{Residency, UpdatePlan};
 use crate::scene::{Background, Frame, Geometry, PartHash, Shot, Texture};
 use adapter::Gpu;
-use frame::{Buffers, Ground};
+use fits::Fits;
+use frame::{Begun, Buffers, Ground, SLOTS};
 use pipelines::Pipelines;
 use rayon::{ThreadPool, ThreadPoolBuilder};
 use resident::{Means, Resident};
 use scene::Records;
-use std::collections::HashMap;
+use std::collections::{HashMap, VecDeque};
 use std::ops::Range;
 
 /// A GPU that renders.
@@ -49,6 +53,8 @@ struct Open {
     background: Option<(PartHash, Range<u32>)>,
     /// The boxes of positions that were asked for in this frame or the one before.
     boxes: HashMap<PartHash, Aabb>,
+    /// Frames under way, the first begun first, and when that was.
+    under_way: VecDeque<(Begun, Stopwatch)>,
 }
 
 impl GpuDevice {
@@ -96,7 +102,15 @@ impl GpuDevice {
             let resident = Resident::new(&gpu).map_err(full)?;
             gpu.check()?;
             let (buffers, boxes) = (Buffers::default(), HashMap::new());
-            self.open = Some(Open { gpu, pipelines, resident, buffers, background: None, boxes });
+            self.open = Some(Open {
+                gpu,
+                pipelines,
+                resident,
+                buffers,
+                background: None,
+                boxes,
+                under_way: VecDeque::new(),
+            });
         }
         match &mut self.open {
             Some(open) => Ok(open),
@@ -125,13 +139,20 @@ impl GpuDevice {
         Ok(cost)
     }
 
-    fn trace_here(&mut self, frame: &Frame, shot: &Shot, stop: &Stop) -> Result<Traced, DeviceError> {
+    fn begin_here(
+        &mut self,
+        frame: &Frame,
+        shot: &Shot,
+        output: Output,
+        stop: &Stop,
+    ) -> Result<(), DeviceError> {
         let start = Stopwatch::start();
         self.opened()?;
         let Self { open: Some(open), pool, info, .. } = self else { return Err(DeviceError::Stopped) };
         if stop.asked() {
             return Err(DeviceError::Stopped);
         }
+        assert!(open.under_way.len() < SLOTS, "a frame must be finished before another is begun");
         let background = match &shot.background {
             Background::Color(_) => None,
             Background::Picture { texture, .. } => Some(open.background(texture.hash(), texture, info)?),
@@ -144,16 +165,39 @@ impl GpuDevice {
             *boxes.entry(name).or_insert_with(|| before.get(&name).copied().unwrap_or_else(make))
         };
         let not_resident = |object| DeviceError::NotResident { device: info.name.clone(), object };
+        // what else is wanted of the film needs floats
+        let output = if shot.alpha || !shot.aovs.is_empty() { Output::Linear } else { output };
         let mut records =
-            Records::new(frame, shot, &open.resident, background, box_of).map_err(not_resident)?;
+            Records::new(frame, shot, output, &open.resident, background, box_of).map_err(not_resident)?;
         open.boxes = boxes;
         let top = open.place_top(&mut records, info)?;
-        let fits = std::mem::take(&mut open.resident.fits);
-        open.buffers.make_boxes(&open.gpu, &fits)?;
-        let traced = open.ground().trace(fits, &records, shot, stop);
+        let fits = Fits::new(&std::mem::take(&mut open.resident.fits));
+        let begun = open.ground().begin(&fits, &records, shot, output, stop);
+        // the queue keeps the order: what is written there next comes after this frame
         open.resident.heaps.nodes.give(top);
-        let (film, rays) = traced?;
-        Ok(Traced { film, rays, trace_ms: start.ms(), readback_ms: None })
+        open.under_way.push_back((begun?, start));
+        Ok(())
+    }
+
+    fn finish_here(&mut self) -> Result<Traced, DeviceError> {
+        let lost = || DeviceError::Lost {
+            device: self.info.name.clone(),
+            why: "what was under way is gone".to_string(),
+        };
+        let Some(open) = &mut self.open else { return Err(lost()) };
+        let Some((begun, start)) = open.under_way.pop_front() else { return Err(lost()) };
+        let (film, facts, readback_ms) = open.ground().finish(&begun, &self.pool)?;
+        for (of, cost) in begun.fits.iter().zip(&facts.costs) {
+            open.resident.fitted(*of, *cost);
+        }
+        let ms = |from: usize, to: usize| {
+            let ticks =
+                facts.instants[to].checked_sub(facts.instants[from]).filter(|_| facts.instants[from] > 0);
+            ticks.map(|ticks| ticks as f64 * f64::from(open.gpu.queue.get_timestamp_period()) * 1e-6)
+        };
+        let trace_ms = ms(2, 3).unwrap_or_else(|| start.ms());
+        let update_ms = if begun.fits.is_empty() { None } else { ms(0, 1) };
+        Ok(Traced { film, rays: facts.rays, trace_ms, update_ms, readback_ms: Some(readback_ms) })
     }
 }
 
@@ -168,9 +212,8 @@ impl Open {
     }
 
     fn fit_now(&mut self) -> Result<(), DeviceError> {
-        let fits = std::mem::take(&mut self.resident.fits);
-        self.buffers.make_boxes(&self.gpu, &fits)?;
-        self.ground().fit_only(fits)
+        let fits = Fits::new(&std::mem::take(&mut self.resident.fits));
+        self.ground().fit_only(&fits)
     }
 
     /// Where the texels of a background picture begin; it is sent where it is another than before.
@@ -238,8 +281,17 @@ impl Device for GpuDevice {
         self.settled(done)
     }
 
-    fn trace(&mut self, frame: &Frame, shot: &Shot, stop: &Stop) -> Result<Traced, DeviceError> {
-        let done = self.trace_here(frame, shot, stop);
+    fn most_under_way(&self) -> usize {
+        SLOTS
+    }
+
+    fn begin(&mut self, frame: &Frame, shot: &Shot, output: Output, stop: &Stop) -> Result<(), DeviceError> {
+        let done = self.begin_here(frame, shot, output, stop);
+        self.settled(done)
+    }
+
+    fn finish(&mut self) -> Result<Traced, DeviceError> {
+        let done = self.finish_here();
         self.settled(done)
     }
 }

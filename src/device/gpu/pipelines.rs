@@ -41,7 +41,7 @@ impl Pipelines {
             SLICE => (wgpu::BufferBindingType::Uniform, true),
             _ => (storage(binding < FILM), false),
         });
-        let refit_layout = layout(gpu, "refit", 6, |binding| match binding {
+        let refit_layout = layout(gpu, "refit", 7, |binding| match binding {
             0 => (wgpu::BufferBindingType::Uniform, true),
             _ => (storage(binding < 3), false),
         });
@@ -84,7 +84,7 @@ impl Pipelines {
     }
 }
 
-fn constants(has: Has) -> [(&'static str, f64); 7] {
+fn constants(has: Has) -> [(&'static str, f64); 8] {
     [
         ("SINGLE_TREE", has.single_tree),
         ("HAS_BRANCHES", has.branches),
@@ -93,6 +93,7 @@ fn constants(has: Has) -> [(&'static str, f64); 7] {
         ("HAS_TRANSPARENCY", has.transparency),
         ("GOES_ON", has.goes_on),
         ("HAS_ALBEDO", has.albedo),
+        ("MAKES_CODES", has.codes),
     ]
     .map(|(name, is_set)| (name, f64::from(u8::from(is_set))))
 }

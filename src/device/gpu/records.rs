@@ -32,6 +32,9 @@ pub struct ShotConstants {
     pub top_reach: f32,
     pub top_objects: u32,
     pub material_slots: u32,
+    pub gain: f32,
+    pub code_steps: u32,
+    pub pad: [u32; 2],
 }
 
 /// Which part of the picture one dispatch traces.

@@ -58,6 +58,8 @@ enum Place {
 /// A tree at its places.
 #[derive(Debug)]
 pub(super) struct GpuTree {
+    /// Stays where its name changes.
+    mark: u64,
     nodes: Range<u32>,
     triangles: Range<u32>,
     vertices: Range<u32>,
@@ -77,9 +79,18 @@ impl GpuTree {
     }
 }
 
+/// Which tree is fitted, and whether it was just built.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct FitOf {
+    mark: u64,
+    is_new: bool,
+}
+
 /// A tree that is to be fitted before the next frame is traced.
 #[derive(Clone, Debug)]
 pub(super) struct Fit {
+    /// The tree.
+    pub(super) of: FitOf,
     pub(super) record: RefitTree,
     pub(super) nodes: u32,
     /// Heights that are dispatches of their own.
@@ -95,6 +106,8 @@ pub(super) struct Resident {
     trees: HashMap<PartHash, GpuTree>,
     /// Fits that were not submitted yet.
     pub(super) fits: Vec<Fit>,
+    /// The mark of the next tree.
+    next_mark: u64,
 }
 
 /// What an update needs beside what is held.
@@ -118,6 +131,7 @@ impl Resident {
             parts: HashMap::new(),
             trees: HashMap::new(),
             fits: Vec::new(),
+            next_mark: 0,
         })
     }
 
@@ -177,7 +191,7 @@ impl Resident {
                     let cost_before = self.residency.trees.get(&from).map_or(0.0, |s| s.cost);
                     self.residency.refit(from, name, geometry, cost_before);
                     self.trees.insert(name, tree);
-                    self.fit(name, geometry);
+                    self.fit(name, geometry, false);
                     cost.refitted.add(geometry.triangles.0.len() as u64, refitted.ms());
                 }
                 Step::Build { tree: name, object, .. } => {
@@ -249,7 +263,7 @@ impl Resident {
         let tree = self.place(packed, triangles.hash(), &vertices_of(triangles), means)?;
         self.residency.hold_tree(name, bytes, TreeState::built(geometry, cost));
         self.trees.insert(name, tree);
-        self.fit(name, geometry);
+        self.fit(name, geometry, true);
         Ok(())
     }
 
@@ -275,7 +289,9 @@ impl Resident {
         let vertices = vertices(&order, means.pool);
         self.heaps.words.write(gpu, place_vertices.start, bytemuck::cast_slice(&vertices));
         self.heaps.words.write(gpu, place_lists.start, bytemuck::cast_slice(&lists));
+        self.next_mark += 1;
         Ok(GpuTree {
+            mark: self.next_mark,
             nodes: place_nodes,
             triangles: place_triangles,
             vertices: place_vertices,
@@ -287,7 +303,7 @@ impl Resident {
     }
 
     /// Asks for a fit of a tree to a geometry's positions before the next frame is traced.
-    fn fit(&mut self, name: PartHash, geometry: &Geometry) {
+    fn fit(&mut self, name: PartHash, geometry: &Geometry, is_new: bool) {
         let (Some(tree), Some(positions)) = (self.trees.get(&name), self.words_of(geometry.positions.hash()))
         else {
             return;
@@ -313,7 +329,17 @@ impl Resident {
             pad_c: 0,
         };
         let below_top = tree.heights[..top].to_vec();
-        self.fits.push(Fit { record, nodes: last, below_top });
+        self.fits.push(Fit { of: FitOf { mark: tree.mark, is_new }, record, nodes: last, below_top });
+    }
+
+    /// Learns what a fit made of a tree's surface-area cost.
+    pub(super) fn fitted(&mut self, of: FitOf, cost: f32) {
+        let name = self.trees.iter().find(|(_, tree)| tree.mark == of.mark).map(|(name, _)| *name);
+        let Some(state) = name.and_then(|name| self.residency.trees.get_mut(&name)) else { return };
+        state.cost = f64::from(cost);
+        if of.is_new {
+            state.built_cost = state.cost;
+        }
     }
 
     fn forget(&mut self, name: PartHash) {

@@ -6,6 +6,8 @@ use super::records::{
 };
 use super::resident::Resident;
 use crate::accel::{Aabb, PackedNode, PackedTop, Placement};
+use crate::device::Output;
+use crate::film::{Srgb8, gain_from_stops};
 use crate::kernel::camera::CameraConstants;
 use crate::kernel::light::{AREA, LightRecord};
 use crate::kernel::material::{HALO, MaterialRecord, TEXTURED};
@@ -30,6 +32,7 @@ pub(super) struct Has {
     pub(super) transparency: bool,
     pub(super) goes_on: bool,
     pub(super) albedo: bool,
+    pub(super) codes: bool,
 }
 
 /// A frame's records.
@@ -54,6 +57,7 @@ impl Records {
     pub(super) fn new(
         frame: &Frame,
         shot: &Shot,
+        output: Output,
         resident: &Resident,
         background: Option<u32>,
         mut box_of: impl FnMut(&Geometry) -> Aabb,
@@ -107,7 +111,18 @@ impl Records {
         tables.extend(&top.tree.order);
         let material_slots = tables.len() as u32;
         tables.extend(world.material_slots());
-        let has = has(&world, shot, &lights, background_map != ABSENT, is_single);
+        let code_steps = tables.len() as u32;
+        let gain = match output {
+            Output::Linear => 1.0,
+            Output::Codes { exposure_stops } => {
+                tables.extend(Srgb8::steps());
+                gain_from_stops(exposure_stops)
+            }
+        };
+        let has = Has {
+            codes: output != Output::Linear,
+            ..has(&world, shot, &lights, background_map != ABSENT, is_single)
+        };
         let shot = ShotConstants {
             camera: CameraConstants::new(&shot.camera, shot.size),
             ambient: shot.ambient,
@@ -129,6 +144,9 @@ impl Records {
             top_reach: top.reach,
             top_objects,
             material_slots,
+            gain,
+            code_steps,
+            pad: [0; 2],
         };
         let emitters = emitters.emitters.iter().zip(&emitters.shares).map(|(e, &share)| EmitterRecord {
             a: e.corners[0],
@@ -173,6 +191,7 @@ fn has(world: &World, shot: &Shot, lights: &[LightRecord], has_picture: bool, is
         transparency: !world.is_opaque,
         goes_on: all().any(lets_through),
         albedo: shot.aovs.contains(Aov::Albedo),
+        codes: false,
     }
 }
 

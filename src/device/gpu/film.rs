@@ -1,0 +1,159 @@
+//! What a frame's kernels wrote, as a film.
+
+use crate::device::{Output, RayCounts};
+use crate::film::Film;
+use crate::scene::Shot;
+use rayon::ThreadPool;
+use rayon::prelude::*;
+use std::ops::Range;
+
+/// Words of a pixel's auxiliary pictures of its centre.
+const CENTER_WORDS: u64 = 12;
+/// Counts of rays, each in two halves.
+pub(super) const COUNTERS: u64 = 10;
+/// Instants: when fits begin and end, and tracing.
+pub(super) const INSTANTS: u64 = 4;
+/// Storage bindings begin at multiples of this on every adapter.
+const ALIGNMENT: u64 = 256;
+/// Pixels that one thread takes out together.
+const GRAIN: usize = 1 << 15;
+
+/// Where the parts of a frame's output lie, in bytes.
+#[derive(Clone, Debug)]
+pub(super) struct Layout {
+    pub(super) film: Range<u64>,
+    /// Empty where nothing of the centres is wanted.
+    pub(super) center: Range<u64>,
+    pub(super) counters: Range<u64>,
+    pub(super) instants: Range<u64>,
+    /// A float for each tree that was fitted.
+    pub(super) costs: Range<u64>,
+}
+
+impl Layout {
+    pub(super) fn new(shot: &Shot, output: Output, has_albedo: bool, fits: u64) -> Self {
+        let pixels = u64::from(shot.size[0]) * u64::from(shot.size[1]);
+        let words_each = match output {
+            Output::Codes { .. } => 1,
+            Output::Linear if has_albedo => 7,
+            Output::Linear => 4,
+        };
+        let mut end = 0_u64;
+        let mut section = |bytes: u64| {
+            let start = end.next_multiple_of(ALIGNMENT);
+            end = start + bytes;
+            start..end
+        };
+        Self {
+            film: section(4 * words_each * pixels),
+            center: section(if wants_center(shot) { 4 * CENTER_WORDS * pixels } else { 0 }),
+            counters: section(4 * COUNTERS),
+            instants: section(8 * INSTANTS),
+            costs: section(4 * fits),
+        }
+    }
+
+    pub(super) fn bytes(&self) -> u64 {
+        self.costs.end.next_multiple_of(16)
+    }
+}
+
+/// Whether auxiliary pictures of the rays through the pixels' centres are wanted.
+fn wants_center(shot: &Shot) -> bool {
+    use crate::scene::Aov::{Depth, Id, Material, Normal, Position, Uv};
+    [Depth, Normal, Position, Id, Material, Uv].into_iter().any(|aov| shot.aovs.contains(aov))
+}
+
+/// What else a frame brought back.
+#[derive(Clone, Debug)]
+pub(super) struct Facts {
+    pub(super) rays: RayCounts,
+    /// Ticks.
+    pub(super) instants: [u64; INSTANTS as usize],
+    /// For each tree that was fitted its surface-area cost.
+    pub(super) costs: Vec<f32>,
+}
+
+/// Takes the film out of a frame's bytes, on the threads of a pool.
+pub(super) fn take_out(
+    bytes: &[u8],
+    layout: &Layout,
+    shot: &Shot,
+    output: Output,
+    pool: &ThreadPool,
+) -> (Film, Facts) {
+    let of = |range: &Range<u64>| &bytes[range.start as usize..range.end as usize];
+    let words = |range: &Range<u64>| bytemuck::cast_slice::<u8, u32>(of(range));
+    let film = pool.install(|| match output {
+        Output::Codes { .. } => Film::of_codes(shot.size, codes(words(&layout.film))),
+        Output::Linear => {
+            let mut film = Film::new(shot.size, shot.alpha, shot.aovs);
+            fill_picture(&mut film, bytemuck::cast_slice(of(&layout.film)));
+            fill_center(&mut film, words(&layout.center));
+            film
+        }
+    });
+    let mut instants = [0; INSTANTS as usize];
+    instants.copy_from_slice(bytemuck::cast_slice(of(&layout.instants)));
+    let costs = bytemuck::cast_slice(of(&layout.costs)).to_vec();
+    (film, Facts { rays: ray_counts(words(&layout.counters)), instants, costs })
+}
+
+/// Three bytes a pixel of words of which each is one.
+fn codes(words: &[u32]) -> Vec<u8> {
+    let mut codes = vec![0; 3 * words.len()];
+    codes.par_chunks_mut(3 * GRAIN).zip(words.par_chunks(GRAIN)).for_each(|(codes, words)| {
+        for (code, word) in codes.as_chunks_mut::<3>().0.iter_mut().zip(words) {
+            let [r, g, b, _] = word.to_le_bytes();
+            *code = [r, g, b];
+        }
+    });
+    codes
+}
+
+fn fill_picture(film: &mut Film, floats: &[f32]) {
+    let pixels = film.rgb.len();
+    let (rows, albedo) = floats.split_at(4 * pixels);
+    let rows = rows.as_chunks::<4>().0;
+    film.rgb.par_chunks_mut(GRAIN).zip(rows.par_chunks(GRAIN)).for_each(|(to, rows)| {
+        for (to, [r, g, b, _]) in to.iter_mut().zip(rows) {
+            *to = [*r, *g, *b];
+        }
+    });
+    for share in [&mut film.alpha, &mut film.aovs.coverage].into_iter().flatten() {
+        for (to, [.., through]) in share.iter_mut().zip(rows) {
+            *to = 1.0 - through;
+        }
+    }
+    if let Some(to) = &mut film.aovs.albedo {
+        to.copy_from_slice(albedo.as_chunks::<3>().0);
+    }
+}
+
+fn fill_center(film: &mut Film, words: &[u32]) {
+    fn each<T>(to: &mut Option<Vec<T>>, pixels: &[[u32; 12]], of: impl Fn(&[u32; 12]) -> T) {
+        for (to, pixel) in to.iter_mut().flatten().zip(pixels) {
+            *to = of(pixel);
+        }
+    }
+    let pixels = words.as_chunks::<{ CENTER_WORDS as usize }>().0;
+    let aovs = &mut film.aovs;
+    let f = f32::from_bits;
+    each(&mut aovs.depth, pixels, |p| f(p[0]));
+    each(&mut aovs.normal, pixels, |p| [f(p[1]), f(p[2]), f(p[3])]);
+    each(&mut aovs.position, pixels, |p| [f(p[4]), f(p[5]), f(p[6])]);
+    each(&mut aovs.id, pixels, |p| [p[7], p[8]]);
+    each(&mut aovs.material, pixels, |p| p[9]);
+    each(&mut aovs.uv, pixels, |p| [f(p[10]), f(p[11])]);
+}
+
+fn ray_counts(words: &[u32]) -> RayCounts {
+    let count = |i: usize| u64::from(words[2 * i]) | u64::from(words[2 * i + 1]) << 32;
+    RayCounts {
+        camera: count(0),
+        shadow: count(1),
+        mirrored: count(2),
+        refracted: count(3),
+        media_ignored: count(4),
+    }
+}
