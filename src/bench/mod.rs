@@ -3,6 +3,8 @@
 
 mod chart;
 mod embree;
+mod frames;
+mod mitsuba;
 mod policy;
 mod reading;
 pub mod sequences;
@@ -15,9 +17,11 @@ mod view;
 mod warm;
 
 use chart::Chart;
+pub use mitsuba::Mitsuba;
 pub use table::{Cell, Table};
 pub use times::Spread;
 
+use crate::device::registry::RegistryError;
 use crate::job::{self, Job, JobError, Options, Request};
 use crate::math::Vec3;
 use crate::output::{OutputError, write_atomic};
@@ -37,6 +41,10 @@ pub struct BenchOptions {
     pub scenes: Option<PathBuf>,
     /// The Embree program (`benches/peers/embree_bench.cpp`).
     pub embree: Option<PathBuf>,
+    /// Mitsuba's script for moving meshes.
+    pub mitsuba: Option<Mitsuba>,
+    /// The device of the tables of devices; None: the best there is.
+    pub device: Option<String>,
     /// Fewer runs, smaller made scenes.
     pub quick: bool,
     /// The tables to make, by name; all where none is named.
@@ -62,8 +70,8 @@ pub struct Workload {
 /// All of them.
 pub const WORKLOADS: [Workload; 1] = [Workload {
     name: "updates",
-    tables: &["reading", "trees", "warm", "start", "policy"],
-    about: "what a frame costs that follows another: reading, trees, refit or rebuild, the store",
+    tables: &["reading", "trees", "warm", "start", "policy", "frames", "refit", "rays"],
+    about: "what a frame costs that follows another: reading, trees, refit or rebuild, the store, devices",
     run: updates::updates,
 }];
 
@@ -91,6 +99,9 @@ pub enum BenchError {
     /// A frame cannot be read or traced.
     #[error("{0}")]
     Frame(String),
+    /// There is no such device.
+    #[error(transparent)]
+    Device(#[from] RegistryError),
     /// The system gives no threads.
     #[error("the system gives no threads; fewer may be asked for by --threads")]
     NoThreads,

@@ -1,6 +1,7 @@
 //! The workload `updates`: reading, trees, warm frames, refit or rebuild, the store, on scenes and on made sequences.
 
 use super::embree::Program;
+use super::frames::{frames, rays, refits};
 use super::policy::{Input, policy};
 use super::reading::{Consecutive, RATE, reading};
 use super::sequences::{HOSTILE, write_wave};
@@ -9,7 +10,9 @@ use super::trees::{EMBREE_REFIT_1, Mesh, trees};
 use super::view::View;
 use super::warm::{WarmPeers, warm_frames};
 use super::{Bench, BenchError, Event, Findings};
+use crate::device::registry;
 use crate::format::{ReadOptions, TextureCache, load_obj};
+use crate::run::machine;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -72,6 +75,9 @@ pub(super) fn updates(bench: &Bench, on_event: &mut dyn FnMut(&Event<'_>)) -> Re
         on_event(&Event::Stage("start"));
         findings.add(starts(bench, &[("sibenik", &sibenik, SIBENIK)])?, on_event);
     }
+    if ["frames", "refit", "rays"].iter().any(|table| bench.wants(table)) {
+        devices(bench, &hostile, &mut findings, on_event)?;
+    }
     if bench.wants("policy") {
         on_event(&Event::Stage("refit or rebuild"));
         let input = |is_charted| move |(name, folder)| Input { name, folder, is_charted };
@@ -82,6 +88,36 @@ pub(super) fn updates(bench: &Bench, on_event: &mut dyn FnMut(&Event<'_>)) -> Re
         findings.charts.extend(charts);
     }
     Ok(findings)
+}
+
+/// The tables of a device.
+fn devices(
+    bench: &Bench,
+    hostile: &[(String, PathBuf)],
+    findings: &mut Findings,
+    on_event: &mut dyn FnMut(&Event<'_>),
+) -> Result<(), BenchError> {
+    let wanted = registry::Wanted {
+        threads: bench.options.threads,
+        budget_bytes: None,
+        host_budget_bytes: machine::default_budget_bytes(),
+        store: None,
+    };
+    let mut device = registry::open(bench.options.device.as_deref(), &wanted)?;
+    let meshes = meshes(bench, hostile)?;
+    if bench.wants("frames") {
+        on_event(&Event::Stage("frames of a device"));
+        findings.add(frames(bench, &mut *device)?, on_event);
+    }
+    if bench.wants("refit") {
+        on_event(&Event::Stage("fits on a device"));
+        findings.add(refits(bench, &mut *device, &meshes)?, on_event);
+    }
+    if bench.wants("rays") {
+        on_event(&Event::Stage("rays of a device"));
+        findings.add(rays(bench, &mut *device, &meshes)?, on_event);
+    }
+    Ok(())
 }
 
 /// The hostile sequences, written.

@@ -1,7 +1,7 @@
 //! `rentix bench`.
 
 use super::Global;
-use crate::bench::{self, BenchOptions, Event, WORKLOADS, Workload};
+use crate::bench::{self, BenchOptions, Event, Mitsuba, WORKLOADS, Workload};
 use crate::run::machine;
 use anyhow::Result;
 use clap::Args;
@@ -31,6 +31,15 @@ pub(super) struct BenchArgs {
     /// The program made of benches/peers/embree_bench.cpp [default: RENTIX_EMBREE]
     #[arg(long, value_name = "PROGRAM")]
     embree: Option<PathBuf>,
+    /// The script mitsuba_anim.py, run beside the tables of devices by python3 [default: RENTIX_MITSUBA]
+    #[arg(long, value_name = "SCRIPT")]
+    mitsuba: Option<PathBuf>,
+    /// The variant of Mitsuba that it runs
+    #[arg(long, value_name = "NAME", default_value = "cuda_ad_rgb")]
+    mitsuba_variant: String,
+    /// The device of the tables frames, refit and rays [default: the best there is]
+    #[arg(long, value_name = "NAME")]
+    device: Option<String>,
     /// Threads [default: all cores]
     #[arg(long, value_name = "N")]
     threads: Option<NonZeroUsize>,
@@ -43,6 +52,9 @@ pub(super) fn bench(args: &BenchArgs, global: &Global) -> Result<ExitCode> {
         folder: args.output.clone(),
         scenes: args.scenes.clone().or_else(|| set("RENTIX_SCENES")),
         embree: args.embree.clone().or_else(|| set("RENTIX_EMBREE")),
+        mitsuba: (args.mitsuba.clone().or_else(|| set("RENTIX_MITSUBA")))
+            .map(|script| Mitsuba { script, variant: args.mitsuba_variant.clone() }),
+        device: args.device.clone(),
         quick: args.quick,
         only: args.only.clone(),
         threads: args.threads.map_or_else(|| machine::machine().cores, usize::from),
