@@ -9,7 +9,11 @@ fn even_bits(number: u32) -> u32 {
 }
 
 @compute @workgroup_size(64)
-fn center(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) local: u32) {
+fn center(
+    @builtin(workgroup_id) group: vec3<u32>,
+    @builtin(num_workgroups) groups: vec3<u32>,
+    @builtin(local_invocation_index) local: u32,
+) {
     thread_in_group = local;
     let pixel = vec2<u32>(
         8u * group.x + even_bits(local),
@@ -18,7 +22,7 @@ fn center(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_ind
     if (pixel.x < shot.size.x && pixel.y < min(shot.size.y, slice.end_row)) {
         fill_center(pixel);
     }
-    add_counts(local);
+    add_counts(local, group.y * groups.x + group.x);
 }
 
 fn fill_center(pixel: vec2<u32>) {

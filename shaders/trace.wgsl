@@ -3,6 +3,8 @@
 
 var<workgroup> lane_sums: array<vec4<f32>, 64>;
 var<workgroup> lane_albedos: array<vec3<f32>, 64>;
+// The words of the tile's pixels, row by row.
+var<workgroup> tile_words: array<u32, 256>;
 
 // Every other bit of a number of up to six, from the lowest on.
 fn even_bits(number: u32) -> u32 {
@@ -54,34 +56,52 @@ fn trace(
         lane_albedos[local] = sum.albedo;
     }
     // its barriers are also those between what the lanes write above and what is read below
-    add_counts(local);
+    add_counts(local, group.y * groups.x + group.x);
     if (is_inside && local % lanes == 0u) {
         let samples = f32(shot.samples);
-        let place = pixel.y * shot.size.x + pixel.x;
         var total = lane_sums[local];
         for (var lane = 1u; lane < lanes; lane += 1u) {
             total += lane_sums[local + lane];
         }
-        if (MAKES_CODES) {
-            let shown = total.xyz / samples * shot.gain;
-            film[place] = code_of(shown.x) | (code_of(shown.y) << 8u) | (code_of(shown.z) << 16u);
-            return;
+        let mean = total / samples;
+        // its place in the tile, row by row
+        let in_tile = (even_bits(number >> 1u) << ((bits + 1u) / 2u)) + even_bits(number);
+        let first = FILM_WORDS * in_tile;
+        if (FILM_WORDS == 1u) {
+            let shown = mean.xyz * shot.gain;
+            tile_words[first] = code_of(shown.x) | (code_of(shown.y) << 8u) | (code_of(shown.z) << 16u);
+        } else {
+            tile_words[first] = bitcast<u32>(mean.x);
+            tile_words[first + 1u] = bitcast<u32>(mean.y);
+            tile_words[first + 2u] = bitcast<u32>(mean.z);
         }
-        let mean = bitcast<vec4<u32>>(total / samples);
-        film[4u * place] = mean.x;
-        film[4u * place + 1u] = mean.y;
-        film[4u * place + 2u] = mean.z;
-        film[4u * place + 3u] = mean.w;
+        if (FILM_WORDS == 4u) {
+            tile_words[first + 3u] = bitcast<u32>(mean.w);
+        }
         if (HAS_ALBEDO) {
             var albedo = lane_albedos[local];
             for (var lane = 1u; lane < lanes; lane += 1u) {
                 albedo += lane_albedos[local + lane];
             }
             let mean_albedo = bitcast<vec3<u32>>(albedo / samples);
-            let first = 4u * shot.size.x * shot.size.y + 3u * place;
-            film[first] = mean_albedo.x;
-            film[first + 1u] = mean_albedo.y;
-            film[first + 2u] = mean_albedo.z;
+            let place = pixel.y * shot.size.x + pixel.x;
+            let albedo_first = FILM_WORDS * shot.size.x * shot.size.y + 3u * place;
+            film[albedo_first] = mean_albedo.x;
+            film[albedo_first + 1u] = mean_albedo.y;
+            film[albedo_first + 2u] = mean_albedo.z;
+        }
+    }
+    workgroupBarrier();
+    // neighbours write words side by side: the film may lie beyond a bus that is slow for less
+    let columns = 1u << ((bits + 1u) / 2u);
+    let corner = vec2<u32>(group.x * columns, slice.first_row + (group.y << (bits / 2u)));
+    let row_words = FILM_WORDS * columns;
+    for (var word = local; word < FILM_WORDS * 64u / lanes; word += 64u) {
+        let row = corner.y + word / row_words;
+        let column_word = word % row_words;
+        let is_in_row = corner.x + column_word / FILM_WORDS < shot.size.x;
+        if (is_in_row && row < min(shot.size.y, slice.end_row)) {
+            film[FILM_WORDS * (row * shot.size.x + corner.x) + column_word] = tile_words[word];
         }
     }
 }

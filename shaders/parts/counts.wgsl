@@ -16,8 +16,11 @@ var<private> traced: RayCounts;
 
 var<workgroup> group_counts: array<atomic<u32>, 5>;
 
+// Rows of counters that workgroups take in turn: all would wait for one.
+const COUNTER_ROWS: u32 = 256u;
+
 // Adds the threads' counts to the frame's. All threads of a workgroup must come here.
-fn add_counts(local: u32) {
+fn add_counts(local: u32, group: u32) {
     if (local < 5u) {
         atomicStore(&group_counts[local], 0u);
     }
@@ -31,10 +34,7 @@ fn add_counts(local: u32) {
     if (local < 5u) {
         let more = atomicLoad(&group_counts[local]);
         if (more != 0u) {
-            let old = atomicAdd(&counters[2u * local], more);
-            if (old + more < old) {
-                atomicAdd(&counters[2u * local + 1u], 1u);
-            }
+            atomicAdd(&counters[8u * (group % COUNTER_ROWS) + local], more);
         }
     }
 }

@@ -209,12 +209,12 @@ const REFLECTION_CUBE: u32 = 2u;
 @group(0) @binding(11) var<storage, read> words: array<u32>;
 // The linear values of the 256 codes of sRGB as floats, then texels.
 @group(0) @binding(12) var<storage, read> texels: array<u32>;
-// What kernels write: four words a pixel (linear RGB, what the background counts for), then, where it is asked for, the
-// albedo, three words a pixel; or one word of codes a pixel; or the auxiliary pictures of the centre.
+// What kernels write: the film's words, pixel by pixel, then, where it is asked for, the albedo, three words a pixel; or the
+// auxiliary pictures of the centre.
 @group(0) @binding(13) var<storage, read_write> film: array<u32>;
 // Rays that wait, for kernels with models beyond 2.
 @group(0) @binding(14) var<storage, read_write> waiting: array<vec4<u32>>;
-// Rays traced: camera, shadow, mirrored, refracted, media ignored; each as low and high half.
+// Rays traced, rows of camera, shadow, mirrored, refracted, media ignored.
 @group(0) @binding(15) var<storage, read_write> counters: array<atomic<u32>>;
 
 // What a frame needs; a kernel is made for what its frame has.
@@ -226,8 +226,9 @@ override HAS_TRANSPARENCY: bool = true;
 // Whether rays go straight on through some surface.
 override GOES_ON: bool = true;
 override HAS_ALBEDO: bool = true;
-// Whether the film is made of codes of 8 bits on the sRGB curve.
-override MAKES_CODES: bool = false;
+// Words of the film for each pixel: 1 for codes of 8 bits on the sRGB curve, 3 for linear RGB, 4 with what the background
+// counts for.
+override FILM_WORDS: u32 = 4u;
 
 struct Ray {
     origin: vec3<f32>,

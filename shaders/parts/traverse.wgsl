@@ -8,6 +8,7 @@ override SINGLE_TREE: bool = false;
 const NEAR: u32 = 6u;
 const FAR: u32 = 44u;
 var<workgroup> near_stack: array<vec2<u32>, 384>;
+var<private> far_stack: array<vec2<u32>, FAR>;
 // Set by each kernel before it traces.
 var<private> thread_in_group: u32;
 
@@ -61,8 +62,10 @@ fn entered_bits(
     return (of_entered.x | of_entered.y) | (of_entered.z | of_entered.w);
 }
 
-// Planes are taken as real numbers and widened by what the computation may be off, 2^-20 of the largest terms (6 · 2^-24
-// are needed), so that nothing inside a box is entered before it, nor met where it is missed.
+// Planes are taken as real numbers and widened by more than what the computation may be off, so that nothing inside a box is
+// entered before it, nor met where it is missed. A plane's distance is byte·step + start: with u = 2^-24 start is off by 2u of
+// itself, step is exact, the product and the sum add 2u of at most start and 256 steps, and an own box's plane is off by 2u of
+// no more than that: 6u of both together. 16u are taken.
 fn enter(node: u32, ray: TracedRay, distance: f32) -> Entered {
     let row = 5u * node;
     let head = nodes[row];
@@ -84,27 +87,42 @@ fn enter(node: u32, ray: TracedRay, distance: f32) -> Entered {
     let near_z = select(low_z_high_x.xy, high_yz.zw, back.z);
     let far_z = select(high_yz.zw, low_z_high_x.xy, back.z);
     let turn4 = ray.turn * 0x01010101u;
-    var bits = 0u;
-    for (var half = 0u; half < 2u; half++) {
-        let entry = max(
-            max(planes(near_x, half, step.x, near.x), planes(near_y, half, step.y, near.y)),
-            max(planes(near_z, half, step.z, near.z), vec4<f32>(0.0)),
-        );
-        let exit = min(
-            min(planes(far_x, half, step.x, far.x), planes(far_y, half, step.y, far.y)),
-            planes(far_z, half, step.z, far.z),
-        ) * EXIT_FACTOR;
-        bits |= entered_bits(entry, exit, distance, select(links.z, links.w, half == 1u), turn4);
-    }
+    let low_near = array<u32, 3>(near_x.x, near_y.x, near_z.x);
+    let low_far = array<u32, 3>(far_x.x, far_y.x, far_z.x);
+    let high_near = array<u32, 3>(near_x.y, near_y.y, near_z.y);
+    let high_far = array<u32, 3>(far_x.y, far_y.y, far_z.y);
+    let bits = entered_of_four(low_near, low_far, step, near, far, distance, links.z, turn4)
+        | entered_of_four(high_near, high_far, step, near, far, distance, links.w, turn4);
     return Entered(
         vec2<u32>(links.x, (bits & 0xff000000u) | (head.w >> 24u)),
         vec2<u32>(links.y, bits & 0x00ffffffu),
     );
 }
 
-fn planes(bytes: vec2<u32>, half: u32, step: f32, start: f32) -> vec4<f32> {
-    let of_half = select(bytes.x, bytes.y, half == 1u);
-    return fma(vec4<f32>(unpack4xU8(of_half)), vec4<f32>(step), vec4<f32>(start));
+fn entered_of_four(
+    near_bytes: array<u32, 3>,
+    far_bytes: array<u32, 3>,
+    step: vec3<f32>,
+    near: vec3<f32>,
+    far: vec3<f32>,
+    distance: f32,
+    meta_bytes: u32,
+    turn4: u32,
+) -> u32 {
+    let entry = max(
+        max(planes(near_bytes[0], step.x, near.x), planes(near_bytes[1], step.y, near.y)),
+        max(planes(near_bytes[2], step.z, near.z), vec4<f32>(0.0)),
+    );
+    let exit = min(
+        min(planes(far_bytes[0], step.x, far.x), planes(far_bytes[1], step.y, far.y)),
+        planes(far_bytes[2], step.z, far.z),
+    ) * EXIT_FACTOR;
+    return entered_bits(entry, exit, distance, meta_bytes, turn4);
+}
+
+// Distances of four planes.
+fn planes(bytes: u32, step: f32, start: f32) -> vec4<f32> {
+    return fma(vec4<f32>(unpack4xU8(bytes)), vec4<f32>(step), vec4<f32>(start));
 }
 
 // Tests the triangle at a place; true where it is the first yet of those that are looked for.
@@ -142,7 +160,6 @@ fn root_group(root: u32) -> vec2<u32> {
 
 // Looks for a candidate; with `any` the first one found ends the search.
 fn search_along(world: Ray, any: bool, search: ptr<function, Search>) {
-    var far_stack: array<vec2<u32>, FAR>;
     var size = 0u;
     // the stack's size where the object's tree begins
     var floor_of_object = 0u;
@@ -190,8 +207,8 @@ fn search_along(world: Ray, any: bool, search: ptr<function, Search>) {
             group = vec2<u32>(0u);
         }
         while (leaves.y != 0u) {
-            let bit = firstTrailingBit(leaves.y);
-            leaves.y &= leaves.y - 1u;
+            let bit = firstLeadingBit(leaves.y);
+            leaves.y &= ~(1u << bit);
             if (!SINGLE_TREE && in_top) {
                 object = tables[shot.top_objects + leaves.x + bit];
                 let entry = box_entry(object_box(object, ray.origin), ray.origin, ray.inverse);

@@ -1,5 +1,6 @@
 //! What a frame's kernels wrote, as a film.
 
+use super::scene::film_words;
 use crate::device::{Output, RayCounts};
 use crate::film::Film;
 use crate::scene::Shot;
@@ -9,8 +10,10 @@ use std::ops::Range;
 
 /// Words of a pixel's auxiliary pictures of its centre.
 const CENTER_WORDS: u64 = 12;
-/// Counts of rays, each in two halves.
-pub(super) const COUNTERS: u64 = 10;
+/// Rows of counts of rays, `COUNTER_ROWS` in shaders/parts/counts.wgsl, of words of which five are used.
+const COUNTER_ROWS: u64 = 256;
+const COUNTER_ROW: u64 = 8;
+pub(super) const COUNTERS: u64 = COUNTER_ROWS * COUNTER_ROW;
 /// Instants: when fits begin and end, and tracing.
 pub(super) const INSTANTS: u64 = 4;
 /// Storage bindings begin at multiples of this on every adapter.
@@ -33,11 +36,7 @@ pub(super) struct Layout {
 impl Layout {
     pub(super) fn new(shot: &Shot, output: Output, has_albedo: bool, fits: u64) -> Self {
         let pixels = u64::from(shot.size[0]) * u64::from(shot.size[1]);
-        let words_each = match output {
-            Output::Codes { .. } => 1,
-            Output::Linear if has_albedo => 7,
-            Output::Linear => 4,
-        };
+        let words_each = u64::from(film_words(shot, output)) + if has_albedo { 3 } else { 0 };
         let mut end = 0_u64;
         let mut section = |bytes: u64| {
             let start = end.next_multiple_of(ALIGNMENT);
@@ -88,7 +87,12 @@ pub(super) fn take_out(
         Output::Codes { .. } => Film::of_codes(shot.size, codes(words(&layout.film))),
         Output::Linear => {
             let mut film = Film::new(shot.size, shot.alpha, shot.aovs);
-            fill_picture(&mut film, bytemuck::cast_slice(of(&layout.film)));
+            let floats = bytemuck::cast_slice(of(&layout.film));
+            if film_words(shot, output) == 3 {
+                fill_rgb(&mut film, floats);
+            } else {
+                fill_rgb_through(&mut film, floats);
+            }
             fill_center(&mut film, words(&layout.center));
             film
         }
@@ -111,9 +115,20 @@ fn codes(words: &[u32]) -> Vec<u8> {
     codes
 }
 
-fn fill_picture(film: &mut Film, floats: &[f32]) {
-    let pixels = film.rgb.len();
-    let (rows, albedo) = floats.split_at(4 * pixels);
+/// Linear RGB, then the albedo where there is one.
+fn fill_rgb(film: &mut Film, floats: &[f32]) {
+    let (rows, albedo) = floats.split_at(3 * film.rgb.len());
+    let rows = rows.as_chunks::<3>().0;
+    film.rgb
+        .par_chunks_mut(GRAIN)
+        .zip(rows.par_chunks(GRAIN))
+        .for_each(|(to, rows)| to.copy_from_slice(rows));
+    fill_albedo(film, albedo);
+}
+
+/// Linear RGB and what the background counts for, then the albedo where there is one.
+fn fill_rgb_through(film: &mut Film, floats: &[f32]) {
+    let (rows, albedo) = floats.split_at(4 * film.rgb.len());
     let rows = rows.as_chunks::<4>().0;
     film.rgb.par_chunks_mut(GRAIN).zip(rows.par_chunks(GRAIN)).for_each(|(to, rows)| {
         for (to, [r, g, b, _]) in to.iter_mut().zip(rows) {
@@ -125,6 +140,10 @@ fn fill_picture(film: &mut Film, floats: &[f32]) {
             *to = 1.0 - through;
         }
     }
+    fill_albedo(film, albedo);
+}
+
+fn fill_albedo(film: &mut Film, albedo: &[f32]) {
     if let Some(to) = &mut film.aovs.albedo {
         to.copy_from_slice(albedo.as_chunks::<3>().0);
     }
@@ -148,7 +167,8 @@ fn fill_center(film: &mut Film, words: &[u32]) {
 }
 
 fn ray_counts(words: &[u32]) -> RayCounts {
-    let count = |i: usize| u64::from(words[2 * i]) | u64::from(words[2 * i + 1]) << 32;
+    let rows = words.as_chunks::<{ COUNTER_ROW as usize }>().0;
+    let count = |i: usize| rows.iter().map(|row| u64::from(row[i])).sum();
     RayCounts {
         camera: count(0),
         shadow: count(1),

@@ -85,7 +85,7 @@ impl Pipelines {
 }
 
 fn constants(has: Has) -> [(&'static str, f64); 8] {
-    [
+    let flags = [
         ("SINGLE_TREE", has.single_tree),
         ("HAS_BRANCHES", has.branches),
         ("HAS_TEXTURES", has.textures),
@@ -93,9 +93,10 @@ fn constants(has: Has) -> [(&'static str, f64); 8] {
         ("HAS_TRANSPARENCY", has.transparency),
         ("GOES_ON", has.goes_on),
         ("HAS_ALBEDO", has.albedo),
-        ("MAKES_CODES", has.codes),
     ]
-    .map(|(name, is_set)| (name, f64::from(u8::from(is_set))))
+    .map(|(name, is_set)| (name, f64::from(u8::from(is_set))));
+    let [a, b, c, d, e, f, g] = flags;
+    [a, b, c, d, e, f, g, ("FILM_WORDS", f64::from(has.film_words))]
 }
 
 fn storage(read_only: bool) -> wgpu::BufferBindingType {
@@ -122,11 +123,15 @@ fn layout(
         .create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label: Some(label), entries: &entries })
 }
 
+/// A kernel's text, compiled without checks at run time: they cost a tenth of the rays.
 fn module(gpu: &Gpu, label: &str, text: &str) -> wgpu::ShaderModule {
-    gpu.device.create_shader_module(wgpu::ShaderModuleDescriptor {
-        label: Some(label),
-        source: wgpu::ShaderSource::Wgsl(text.into()),
-    })
+    let descriptor =
+        wgpu::ShaderModuleDescriptor { label: Some(label), source: wgpu::ShaderSource::Wgsl(text.into()) };
+    // SAFETY: the texts are this crate's own. What they index by was made here: places in heaps and tables by `resident` and
+    // `scene`, links of nodes by `PackedTree`, indices of vertices by the readers, which let none out of range through;
+    // threads, pixels and waiting rays are compared with their bounds in the kernels, the depth of stacks is bounded by
+    // `MAX_DEPTH`. Every loop ends: over counts of records, over levels of trees, over surfaces up to `SURFACES_MAX`.
+    unsafe { gpu.device.create_shader_module_trusted(descriptor, wgpu::ShaderRuntimeChecks::unchecked()) }
 }
 
 fn pipeline(

@@ -16,6 +16,8 @@ use std::ops::Range;
 
 /// Nodes that one workgroup fits height after height, at most.
 const TOP_NODES: u32 = 256;
+/// A GPU traces so fast that a tree is worth more than the least work; no splits: a tree is refitted.
+const QUALITY: Quality = Quality::Medium;
 /// Triangles whose vertices one thread looks up together.
 const GRAIN: usize = 4096;
 
@@ -243,7 +245,7 @@ impl Resident {
 
     fn build(&mut self, name: PartHash, geometry: &Geometry, means: &Means) -> Result<(), DeviceError> {
         let (positions, triangles) = (&geometry.positions.0, &geometry.triangles);
-        let packed = means.pool.install(|| PackedTree::build(positions, &triangles.0, Quality::default()));
+        let packed = means.pool.install(|| PackedTree::build(positions, &triangles.0, QUALITY));
         let bytes = packed.device_bytes();
         // many small objects may need more than the estimate
         if self.residency.bytes() + bytes > means.info.budget_bytes {

@@ -32,7 +32,8 @@ pub(super) struct Has {
     pub(super) transparency: bool,
     pub(super) goes_on: bool,
     pub(super) albedo: bool,
-    pub(super) codes: bool,
+    /// Words of the film for each pixel.
+    pub(super) film_words: u32,
 }
 
 /// A frame's records.
@@ -120,7 +121,7 @@ impl Records {
             }
         };
         let has = Has {
-            codes: output != Output::Linear,
+            film_words: film_words(shot, output),
             ..has(&world, shot, &lights, background_map != ABSENT, is_single)
         };
         let shot = ShotConstants {
@@ -191,7 +192,16 @@ fn has(world: &World, shot: &Shot, lights: &[LightRecord], has_picture: bool, is
         transparency: !world.is_opaque,
         goes_on: all().any(lets_through),
         albedo: shot.aovs.contains(Aov::Albedo),
-        codes: false,
+        film_words: 0,
+    }
+}
+
+/// One for codes, three for linear RGB, four with what the background counts for.
+pub(super) fn film_words(shot: &Shot, output: Output) -> u32 {
+    match output {
+        Output::Codes { .. } => 1,
+        Output::Linear if shot.alpha || shot.aovs.contains(Aov::Coverage) => 4,
+        Output::Linear => 3,
     }
 }
 

@@ -1,0 +1,301 @@
+//! Warm frames on a device without files: a sphere whose vertices move each frame, beside Mitsuba's script of the same
+//! (`--mitsuba`); what a fit of trees costs; and rays through rooms.
+
+use super::mitsuba::{Mitsuba, Rate};
+use super::table::{Cell, Table};
+use super::times::Spread;
+use super::view::View;
+use super::{Bench, BenchError};
+use crate::clock::Stopwatch;
+use crate::device::{Device, DeviceError, Output, Stop, Traced};
+use crate::math::{DVec3, Vec3};
+use crate::plan::{Update, Wishes, plan_frame};
+use crate::scene::{
+    AovSet, Background, Camera, Faces, Falloff, Filter, Frame, Geometry, Light, Material, MaterialRuns, Mesh,
+    Object, Part, Positions, Shot, Triangles,
+};
+use std::collections::VecDeque;
+use std::f32::consts::PI;
+use std::sync::Arc;
+
+/// Poses that take turns.
+const POSES: u32 = 24;
+/// Frames that are measured, after as many poses unmeasured.
+const FRAMES: usize = 120;
+/// Frames before those that are measured, at least.
+const WARM: usize = 60;
+/// Around and from pole to pole: of the peer's sphere, 147,456 triangles, and of one of 1,048,576.
+const SPHERE: [u32; 2] = [384, 192];
+const LARGE_SPHERE: [u32; 2] = [1024, 512];
+
+/// Sizes of pictures, and samples a pixel.
+const SHOTS: [([u32; 2], u32); 4] =
+    [([1280, 720], 1), ([1920, 1080], 1), ([1280, 720], 16), ([1920, 1080], 16)];
+
+fn failed(error: DeviceError) -> BenchError {
+    BenchError::Frame(error.to_string())
+}
+
+/// Frames a second, one at a time and as many under way as the device takes, as codes of 8 bits and as floats.
+pub(super) fn frames(bench: &Bench, device: &mut dyn Device) -> Result<Table, BenchError> {
+    let mut table = Table::new(
+        "frames",
+        "A warm frame without files, the sphere of 147,456 triangles deforming (update, trace, read back), frames/s; Mitsuba's float picture in the same run.",
+        &[
+            "one at a time",
+            "under way",
+            "Mitsuba",
+            "one/Mitsuba",
+            "under way/Mitsuba",
+            "upload, ms",
+            "refit, ms",
+            "trace, ms",
+            "read back, ms",
+        ],
+    );
+    let poses = poses(SPHERE);
+    let mitsuba: Vec<Rate> = bench.options.mitsuba.as_ref().map(Mitsuba::rates).unwrap_or_default();
+    for (size, samples) in SHOTS {
+        let shot = sphere_shot(&poses[0], size, samples);
+        let peer = mitsuba.iter().find(|r| r.size == size && r.samples == samples).map(|r| r.frames_per_s);
+        for (output, word) in [(Output::Codes { exposure_stops: 0.0 }, "8 bits"), (Output::Linear, "float")] {
+            let rounds = bench.rounds(FRAMES);
+            let one = run(device, &poses, &shot, output, rounds, 1)?;
+            let most = device.most_under_way();
+            let many = run(device, &poses, &shot, output, rounds, most)?;
+            let peer = Cell::from(peer);
+            let (one_rate, many_rate) = (Cell::from(one.frames_per_s), Cell::from(many.frames_per_s));
+            table.row(
+                format!("{}x{}, {samples} samples, {word}", size[0], size[1]),
+                [
+                    one_rate,
+                    many_rate,
+                    peer,
+                    peer.times_in(one_rate),
+                    peer.times_in(many_rate),
+                    Spread::of(one.upload_ms).into(),
+                    Spread::of(one.update_ms).into(),
+                    Spread::of(one.trace_ms).into(),
+                    Spread::of(one.readback_ms).into(),
+                ],
+            );
+        }
+    }
+    Ok(table)
+}
+
+/// Fits of trees where they stand.
+pub(super) fn refits(
+    bench: &Bench,
+    device: &mut dyn Device,
+    meshes: &[super::trees::Mesh],
+) -> Result<Table, BenchError> {
+    let mut table = Table::new(
+        "refit",
+        "Fitting trees to moved vertices on the device, all vertices of the mesh moving.",
+        &["triangles", "refit, ms", "ns a triangle"],
+    );
+    let mut all: Vec<(String, Vec<Frame>)> =
+        vec![("sphere".to_string(), poses(SPHERE)), ("large sphere".to_string(), poses(LARGE_SPHERE))];
+    all.extend(meshes.iter().filter(|m| m.name != "sheet").map(|m| (m.name.clone(), moving(&m.geometry))));
+    for (name, frames) in all {
+        let shot = sphere_shot(&frames[0], [64, 36], 1);
+        let ran = run(device, &frames, &shot, Output::Linear, bench.rounds(FRAMES / 2), 1)?;
+        let triangles = frames[0].triangles() as f64;
+        let ms = Spread::of(ran.update_ms);
+        table.row(name, [triangles.into(), ms.into(), ms.map(|s| s.median * 1e6 / triangles).into()]);
+    }
+    Ok(table)
+}
+
+/// Camera and shadow rays a second, by the time of tracing and shading alone.
+pub(super) fn rays(
+    bench: &Bench,
+    device: &mut dyn Device,
+    meshes: &[super::trees::Mesh],
+) -> Result<Table, BenchError> {
+    let mut table = Table::new(
+        "rays",
+        "Camera and shadow rays, by the device's own time for tracing and shading, 10^9/s.",
+        &["1280x720, 1", "1920x1080, 1", "1280x720, 16", "1920x1080, 16"],
+    );
+    let sphere = poses(SPHERE).remove(0);
+    let mut all = vec![("sphere".to_string(), sphere.clone(), sphere_shot(&sphere, [8, 8], 1))];
+    for mesh in meshes.iter().filter(|m| m.name != "sheet") {
+        let frame = Frame { objects: vec![Object { geometry: Arc::clone(&mesh.geometry), transform: None }] };
+        let mut shot = sphere_shot(&frame, [8, 8], 1);
+        if let Some(View { eye, look_at, fov_deg }) = mesh.view {
+            let point = |p: [f32; 3]| Vec3::from(p).as_dvec3();
+            let (eye, look_at) = (point(eye), point(look_at));
+            shot.camera = Camera { eye, look_at, up: DVec3::Y, fov_deg: fov_deg.into() };
+            // a lamp beside the eye, so that what is seen is lit
+            let beside = shot.camera.axes().1 * 0.1 * (look_at - eye).length();
+            shot.lights = vec![lamp((eye + beside).as_vec3())];
+        }
+        all.push((mesh.name.clone(), frame, shot));
+    }
+    for (name, frame, shot) in all {
+        let mut cells = [Cell::Absent; SHOTS.len()];
+        for (cell, (size, samples)) in cells.iter_mut().zip(SHOTS) {
+            let shot = Shot { size, samples, ..shot.clone() };
+            let output = Output::Codes { exposure_stops: 0.0 };
+            let ran = run(device, std::slice::from_ref(&frame), &shot, output, bench.rounds(20), 1)?;
+            *cell = Spread::of(ran.trace_ms).map(|ms| ran.rays as f64 / ms.median * 1e-6).into();
+        }
+        table.row(name, [cells[0], cells[1], cells[2], cells[3]]);
+    }
+    Ok(table)
+}
+
+/// What some frames took.
+#[derive(Default)]
+struct Ran {
+    frames_per_s: f64,
+    upload_ms: Vec<f64>,
+    update_ms: Vec<f64>,
+    trace_ms: Vec<f64>,
+    readback_ms: Vec<f64>,
+    /// Camera and shadow rays of one frame.
+    rays: u64,
+}
+
+/// Renders frames in turn, each fitted to the one before, with so many under way.
+fn run(
+    device: &mut dyn Device,
+    frames: &[Frame],
+    shot: &Shot,
+    output: Output,
+    count: usize,
+    under_way: usize,
+) -> Result<Ran, BenchError> {
+    let mut ran = Ran::default();
+    let mut uploads = VecDeque::new();
+    let mut clock = Stopwatch::start();
+    // clocks rise, kernels are made
+    let warm = frames.len().max(WARM);
+    for i in 0..warm + count {
+        if i == warm {
+            while !uploads.is_empty() {
+                ran.take(device, &mut uploads, false)?;
+            }
+            clock = Stopwatch::start();
+        }
+        let frame = &frames[i % frames.len()];
+        let wishes = Wishes { update: Update::Refit, ..Wishes::default() };
+        let plan = plan_frame(frame, device.residency(), &wishes);
+        let cost = device.apply(&plan, frame).map_err(failed)?;
+        device.begin(frame, shot, output, &Stop::default()).map_err(failed)?;
+        uploads.push_back(cost.upload_ms);
+        while uploads.len() >= under_way {
+            ran.take(device, &mut uploads, i >= warm)?;
+        }
+    }
+    while !uploads.is_empty() {
+        ran.take(device, &mut uploads, true)?;
+    }
+    ran.frames_per_s = count as f64 / clock.s();
+    Ok(ran)
+}
+
+impl Ran {
+    fn take(
+        &mut self,
+        device: &mut dyn Device,
+        uploads: &mut VecDeque<Option<f64>>,
+        is_measured: bool,
+    ) -> Result<(), BenchError> {
+        let upload_ms = uploads.pop_front().flatten();
+        let Traced { film, rays, trace_ms, update_ms, readback_ms } = device.finish().map_err(failed)?;
+        std::hint::black_box(film);
+        if is_measured {
+            self.rays = rays.camera + rays.shadow;
+            self.trace_ms.push(trace_ms);
+            self.upload_ms.extend(upload_ms);
+            self.update_ms.extend(update_ms);
+            self.readback_ms.extend(readback_ms);
+        }
+        Ok(())
+    }
+}
+
+/// The sphere of the peer's script in all its poses.
+fn poses([around, down]: [u32; 2]) -> Vec<Frame> {
+    let point = |i: u32, j: u32| {
+        let (v, u) = (PI * i as f32 / down as f32, 2.0 * PI * j as f32 / around as f32);
+        [libm::sinf(v) * libm::cosf(u), libm::cosf(v), libm::sinf(v) * libm::sinf(u)]
+    };
+    let positions: Vec<[f32; 3]> = (0..=down).flat_map(|i| (0..around).map(move |j| point(i, j))).collect();
+    let at = |i: u32, j: u32| i * around + j % around;
+    let triangles: Vec<[u32; 3]> = (0..down)
+        .flat_map(|i| {
+            (0..around).flat_map(move |j| {
+                [[at(i, j), at(i + 1, j + 1), at(i + 1, j)], [at(i, j), at(i, j + 1), at(i + 1, j + 1)]]
+            })
+        })
+        .collect();
+    let count = triangles.len() as u32;
+    let geometry = Geometry {
+        positions: Part::new(Positions(positions)),
+        faces: Part::new(Faces { counts: vec![3; count as usize], corners: triangles.concat() }),
+        triangles: Part::new(Triangles(triangles)),
+        texcoords: None,
+        normals: None,
+        colors: None,
+        material_runs: Part::new(MaterialRuns(vec![[0, 0]])),
+        materials: vec![Part::new(Material::default())],
+        meshes: vec![Mesh { first_face: 0, face_count: count, first_triangle: 0, triangle_count: count }],
+    };
+    moving(&geometry)
+}
+
+/// A mesh as waves run through it, as in the peer's script.
+fn moving(geometry: &Geometry) -> Vec<Frame> {
+    let (_, diagonal) = extent(geometry);
+    let k = 12.0 / diagonal;
+    let pose = |f: u32| {
+        let s = 0.02 * diagonal * libm::sinf(2.0 * PI * f as f32 / POSES as f32);
+        let moved = |&[x, y, z]: &[f32; 3]| {
+            [x + s * libm::sinf(k * y), y + s * libm::sinf(k * z + 1.0), z + s * libm::sinf(k * x + 2.0)]
+        };
+        let positions = Part::new(Positions(geometry.positions.0.iter().map(moved).collect()));
+        let geometry = Arc::new(Geometry { positions, ..geometry.clone() });
+        Frame { objects: vec![Object { geometry, transform: None }] }
+    };
+    (0..POSES).map(pose).collect()
+}
+
+/// The middle of a mesh and its diagonal.
+fn extent(geometry: &Geometry) -> (Vec3, f32) {
+    let points = geometry.positions.0.iter().map(|&p| Vec3::from(p));
+    let min = points.clone().fold(Vec3::INFINITY, Vec3::min);
+    let max = points.fold(Vec3::NEG_INFINITY, Vec3::max);
+    ((min + max) * 0.5, (max - min).length())
+}
+
+fn lamp(position: Vec3) -> Light {
+    Light::Point { position, color: Vec3::ONE, intensity: 1.0, falloff: Falloff::None }
+}
+
+/// The camera and light of the peer's script.
+fn sphere_shot(frame: &Frame, size: [u32; 2], samples: u32) -> Shot {
+    let (middle, diagonal) = extent(&frame.objects[0].geometry);
+    Shot {
+        camera: Camera {
+            eye: (middle + Vec3::new(0.25, 0.2, 1.0) * diagonal).as_dvec3(),
+            look_at: middle.as_dvec3(),
+            up: DVec3::Y,
+            fov_deg: 40.0,
+        },
+        lights: vec![lamp(middle + Vec3::new(0.6, 1.2, 1.0) * diagonal)],
+        ambient: Vec3::ZERO,
+        background: Background::Color(Vec3::ZERO),
+        size,
+        samples,
+        filter: Filter::Box,
+        depth: 10,
+        seed: 0,
+        prune: 1.0 / 4096.0,
+        alpha: false,
+        aovs: AovSet::default(),
+    }
+}
