@@ -4,8 +4,8 @@
 
 // A tree, and where its parts are.
 struct RefitTree {
-    // Places of words in `words`: positions; for each place of a leaf the triangle's vertices and its number; the nodes by
-    // height; for each height its first node in that list, and the list's end.
+    // Places of words in `words`: positions; the nodes by height; for each height its first node in that list, and the
+    // list's end. And in rows of four: for each place of a leaf the triangle's vertices and its number.
     positions: u32,
     vertices: u32,
     by_height: u32,
@@ -41,9 +41,11 @@ struct RefitLevel {
 @group(0) @binding(5) var<storage, read_write> boxes: array<vec4<f32>>;
 // For each tree its surface-area cost.
 @group(0) @binding(6) var<storage, read_write> costs: array<f32>;
+// The same as `words`, by rows of four.
+@group(0) @binding(7) var<storage, read> rows: array<vec4<u32>>;
 
-const GROUP: u32 = 256u;
-const NODES_IN_GROUP: u32 = 32u;
+// Threads of a workgroup.
+override GROUP: u32 = 256u;
 
 var<workgroup> lows: array<vec4<f32>, GROUP>;
 var<workgroup> highs: array<vec4<f32>, GROUP>;
@@ -89,11 +91,11 @@ fn half_area(box: Aabb) -> f32 {
 
 // Takes the corners of a triangle; gives its own box. One that cannot be hit has three equal corners and no box.
 fn fit_triangle(tree: RefitTree, place: u32) -> Aabb {
-    let at = tree.vertices + 4u * (place - tree.first_triangle);
-    let number = words[at + 3u];
-    var a = position(tree, words[at]);
-    var b = position(tree, words[at + 1u]);
-    var c = position(tree, words[at + 2u]);
+    let vertices = rows[tree.vertices + place - tree.first_triangle];
+    let number = vertices.w;
+    var a = position(tree, vertices.x);
+    var b = position(tree, vertices.y);
+    var c = position(tree, vertices.z);
     let infinite = bitcast<f32>(INFINITE_BITS);
     var box = Aabb(vec3<f32>(infinite), vec3<f32>(-infinite));
     if (has_area(a, b, c)) {
@@ -226,13 +228,13 @@ fn fit_node(tree: RefitTree, node: u32, is_there: bool, thread: u32) {
     }
 }
 
-@compute @workgroup_size(256)
+@compute @workgroup_size(GROUP)
 fn refit_level(
     @builtin(workgroup_id) group: vec3<u32>,
     @builtin(num_workgroups) groups: vec3<u32>,
     @builtin(local_invocation_index) thread: u32,
 ) {
-    let number = (group.y * groups.x + group.x) * NODES_IN_GROUP + thread / 8u;
+    let number = (group.y * groups.x + group.x) * (GROUP / 8u) + thread / 8u;
     let tree = trees[level.tree];
     let is_there = number < level.count;
     var node = 0u;
@@ -242,13 +244,13 @@ fn refit_level(
     fit_node(tree, node, is_there, thread);
 }
 
-@compute @workgroup_size(256)
+@compute @workgroup_size(GROUP)
 fn refit_top(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) thread: u32) {
     let tree = trees[level.tree + group.x];
     for (var height = tree.top_height; height < tree.height_count; height++) {
         let first = words[tree.heights + height];
         let count = words[tree.heights + height + 1u] - first;
-        for (var start = 0u; start < count; start += NODES_IN_GROUP) {
+        for (var start = 0u; start < count; start += GROUP / 8u) {
             let number = start + thread / 8u;
             let is_there = number < count;
             var node = 0u;

@@ -74,7 +74,7 @@ fn settle(s: Shading) -> bool {
         path.weight += s.weight * (1.0 - shadow(s.sum));
         return false;
     }
-    let plain = color(s.surface, m, s.sum);
+    let plain = plain_color(s);
     let mirror = mirror_of(m);
     let away = mirrored(s.view, s.surface.n);
     if (m.illum == 8u || m.illum == 9u) {

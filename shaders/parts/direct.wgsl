@@ -9,8 +9,15 @@ struct Shading {
     constants: MaterialRecord,
     // Unit vector towards the viewer.
     view: vec3<f32>,
-    // What its lights add up to.
+    // Its colour without light from lights.
+    own: vec3<f32>,
+    // What its lights add up to; nothing in model 0.
     sum: Reflected,
+}
+
+// The colour without mirrored and refracted light.
+fn plain_color(s: Shading) -> vec3<f32> {
+    return s.own + s.sum.diffuse + s.sum.specular;
 }
 
 // Which of a pixel's samples is being taken, and how many surfaces its paths have met before in it.
@@ -31,7 +38,9 @@ fn add_lights(surface: Surface, m: MaterialRecord, view: vec3<f32>, at: Sample) 
     if (m.illum == 0u) {
         return sum;
     }
-    for (var number = 0u; number < shot.light_count; number += 1u) {
+    // of one light a driver then knows that nothing of the surface is needed once its ray is traced
+    let count = select(shot.light_count, 1u, HAS_ONE_LIGHT);
+    for (var number = 0u; number < count; number += 1u) {
         var points = 1u;
         if (HAS_AREA_LIGHT) {
             if (lights[number].kind == AREA) {
@@ -55,16 +64,19 @@ fn add_lights(surface: Surface, m: MaterialRecord, view: vec3<f32>, at: Sample) 
             if (m.illum == 10u) {
                 sum.specular += unshadowed(surface, arriving);
             }
-            var visibility = vec3<f32>(1.0);
-            if (HAS_TRANSPARENCY) {
-                visibility = transmittance(ray, end);
-            } else if (occluded(ray, end)) {
-                visibility = vec3<f32>(0.0);
-            }
-            if (!is_zero(visibility)) {
-                let light_here = reflected(surface, m, view, arriving);
-                sum.diffuse += light_here.diffuse * visibility;
-                sum.specular += light_here.specular * visibility;
+            let light_here = reflected(surface, m, view, arriving);
+            let met = meets(ray, end);
+            if (met == MEETS_NOTHING) {
+                sum.diffuse += light_here.diffuse;
+                sum.specular += light_here.specular;
+            } else if (HAS_TRANSPARENCY) {
+                if (met == MEETS_CLEAR) {
+                    let visibility = transmittance(ray, end);
+                    if (!is_zero(visibility)) {
+                        sum.diffuse += light_here.diffuse * visibility;
+                        sum.specular += light_here.specular * visibility;
+                    }
+                }
             }
         }
     }

@@ -109,17 +109,19 @@ fn meet(hit: Hit, at: Sample) -> bool {
         let weight = path.weight * covered;
         path.weight *= 1.0 - covered;
         let view = -path.ray.direction;
-        let shading = Shading(weight, surface, m, view, add_lights(surface, m, view, at));
+        // before the lights' rays, so that the surface is not needed after them
+        let own = own_color(surface, m);
+        let shading = Shading(weight, surface, m, view, own, add_lights(surface, m, view, at));
         if (HAS_BRANCHES) {
             if (m.illum > 2u) {
                 if (settle(shading)) {
                     return true;
                 }
             } else {
-                sum.rgb += color(surface, m, shading.sum) * weight;
+                sum.rgb += plain_color(shading) * weight;
             }
         } else {
-            sum.rgb += color(surface, m, shading.sum) * weight;
+            sum.rgb += plain_color(shading) * weight;
         }
     }
     if (HAS_BRANCHES || GOES_ON) {

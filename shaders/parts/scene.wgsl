@@ -225,6 +225,8 @@ override HAS_AREA_LIGHT: bool = true;
 override HAS_TRANSPARENCY: bool = true;
 // Whether rays go straight on through some surface.
 override GOES_ON: bool = true;
+// Whether there is one light, and it is no area light.
+override HAS_ONE_LIGHT: bool = false;
 override HAS_ALBEDO: bool = true;
 // Words of the film for each pixel: 1 for codes of 8 bits on the sRGB curve, 3 for linear RGB, 4 with what the background
 // counts for.

@@ -40,10 +40,10 @@ fn unshadowed(surface: Surface, light: Incident) -> vec3<f32> {
     return light.radiance * dot(surface.n, light.direction);
 }
 
-// The colour without mirrored and refracted light.
-fn color(surface: Surface, m: MaterialRecord, sum: Reflected) -> vec3<f32> {
+// The colour without light from lights and without mirrored and refracted light.
+fn own_color(surface: Surface, m: MaterialRecord) -> vec3<f32> {
     if (m.illum == 0u) {
         return surface.kd;
     }
-    return m.ka * shot.ambient + m.ke + sum.diffuse + sum.specular;
+    return m.ka * shot.ambient + m.ke;
 }

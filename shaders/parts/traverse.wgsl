@@ -36,6 +36,8 @@ struct Search {
     triangle: u32,
     place: u32,
     barycentric: vec2<f32>,
+    // Whether a candidate was met that lets shadow rays through.
+    is_clear: bool,
 }
 
 // The children of a node that a ray enters not after a distance.
@@ -125,8 +127,16 @@ fn planes(bytes: u32, step: f32, start: f32) -> vec4<f32> {
     return fma(vec4<f32>(unpack4xU8(bytes)), vec4<f32>(step), vec4<f32>(start));
 }
 
-// Tests the triangle at a place; true where it is the first yet of those that are looked for.
-fn test_triangle(place: u32, ray: TracedRay, object: u32, first_primitive: u32, search: ptr<function, Search>) -> bool {
+// Tests the triangle at a place; true where it is the first yet of those that are looked for. With `any` those that let shadow
+// rays through are noted and passed by.
+fn test_triangle(
+    place: u32,
+    ray: TracedRay,
+    object: u32,
+    first_primitive: u32,
+    any: bool,
+    search: ptr<function, Search>,
+) -> bool {
     let row_a = triangles[3u * place];
     let row_b = triangles[3u * place + 1u];
     let row_c = triangles[3u * place + 2u];
@@ -144,6 +154,12 @@ fn test_triangle(place: u32, ray: TracedRay, object: u32, first_primitive: u32, 
     let candidate = HitOrder(max(in_plane.distance, entry), first_primitive + row_a.w);
     if (!precedes((*search).after, candidate) || !precedes(candidate, (*search).before)) {
         return false;
+    }
+    if (HAS_TRANSPARENCY && any) {
+        if (is_clear(object, row_a.w)) {
+            (*search).is_clear = true;
+            return false;
+        }
     }
     (*search).before = candidate;
     (*search).object = object;
@@ -241,7 +257,7 @@ fn search_along(world: Ray, any: bool, search: ptr<function, Search>) {
                 group = root_group(objects[object].root);
                 break;
             }
-            if (test_triangle(leaves.x + bit, ray, object, first_primitive, search) && any) {
+            if (test_triangle(leaves.x + bit, ray, object, first_primitive, any, search) && any) {
                 return;
             }
         }
@@ -280,16 +296,24 @@ fn all_children(node: u32, turn: u32) -> Entered {
 // The first candidate after a place of the order.
 fn closest(ray: Ray, after: HitOrder) -> Hit {
     let end = HitOrder(bitcast<f32>(INFINITE_BITS), 0u);
-    var search = Search(after, end, ABSENT, 0u, 0u, vec2<f32>(0.0));
+    var search = Search(after, end, ABSENT, 0u, 0u, vec2<f32>(0.0), false);
     search_along(ray, false, &search);
     return Hit(search.before.distance, search.object, search.triangle, search.place, search.barycentric);
 }
 
-// Whether any candidate has a distance below `end`.
-fn occluded(ray: Ray, end: f32) -> bool {
-    var search = Search(order_start(), HitOrder(end, 0u), ABSENT, 0u, 0u, vec2<f32>(0.0));
+// What a shadow ray meets: nothing, something that lets no light through, or else only what may let some through.
+const MEETS_NOTHING: u32 = 0u;
+const MEETS_OPAQUE: u32 = 1u;
+const MEETS_CLEAR: u32 = 2u;
+
+// What is met at a distance below `end`.
+fn meets(ray: Ray, end: f32) -> u32 {
+    var search = Search(order_start(), HitOrder(end, 0u), ABSENT, 0u, 0u, vec2<f32>(0.0), false);
     search_along(ray, true, &search);
-    return search.object != ABSENT;
+    if (search.object != ABSENT) {
+        return MEETS_OPAQUE;
+    }
+    return select(MEETS_NOTHING, MEETS_CLEAR, search.is_clear);
 }
 
 // The corners of the triangle that was hit, in its object's space.

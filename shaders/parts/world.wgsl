@@ -33,12 +33,17 @@ struct Coordinates {
 
 // The place of the material at a hit in `materials`.
 fn material_of(hit: Hit) -> u32 {
-    let runs = objects[hit.object].runs;
+    return material_at(hit.object, hit.triangle);
+}
+
+// The place of a triangle's material in `materials`.
+fn material_at(object: u32, triangle: u32) -> u32 {
+    let runs = objects[object].runs;
     var low = 0u;
-    var high = objects[hit.object].run_count;
+    var high = objects[object].run_count;
     while (low < high) {
         let middle = (low + high) / 2u;
-        if (words[runs + 2u * middle] <= hit.triangle) {
+        if (words[runs + 2u * middle] <= triangle) {
             low = middle + 1u;
         } else {
             high = middle;
@@ -51,7 +56,7 @@ fn material_of(hit: Hit) -> u32 {
     if (slot == ABSENT) {
         return 0u;
     }
-    return tables[objects[hit.object].slots + slot];
+    return tables[objects[object].slots + slot];
 }
 
 // The place of a material among those that the frame uses, in the order of their first use.
@@ -124,6 +129,12 @@ fn changed(ray: Ray, hit: Hit, triangle: PlacedTriangle, surface: Surface, width
         result.constants.d = with_halo(result.constants.d, -dot(result.n, ray.direction));
     }
     return result;
+}
+
+// Whether a triangle's material may let shadow rays through.
+fn is_clear(object: u32, triangle: u32) -> bool {
+    let m = materials[material_at(object, triangle)];
+    return (m.flags & (TEXTURED_SHADOW | HALO)) != 0u || !is_zero(material_shadow_factor(m));
 }
 
 // What a shadow ray is let through at a hit.

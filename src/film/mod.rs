@@ -81,9 +81,15 @@ impl Film {
     /// A black film with room for what is asked.
     pub fn new(size: [u32; 2], alpha: bool, aovs: AovSet) -> Self {
         let n = size[0] as usize * size[1] as usize;
+        Self { rgb: vec![[0.0; 3]; n], ..Self::without_rgb(size, alpha, aovs) }
+    }
+
+    /// The same before its colour is there.
+    pub fn without_rgb(size: [u32; 2], alpha: bool, aovs: AovSet) -> Self {
+        let n = size[0] as usize * size[1] as usize;
         Self {
             size,
-            rgb: vec![[0.0; 3]; n],
+            rgb: Vec::new(),
             codes: None,
             alpha: alpha.then(|| vec![0.0; n]),
             aovs: Aovs {

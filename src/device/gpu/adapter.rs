@@ -6,8 +6,10 @@ use std::sync::{Arc, Mutex, PoisonError};
 /// Storage buffers that the kernels bind at once.
 const STORAGE_BUFFERS: u32 = 14;
 /// Threads of the largest workgroup, and bytes that they share.
-const GROUP_THREADS: u32 = 256;
+pub(super) const GROUP_THREADS: u32 = 256;
 const GROUP_BYTES: u32 = 10_240;
+/// What is better: twice as many.
+const TOP_THREADS: u32 = 512;
 /// The least storage binding that is worth it.
 const BINDING_BYTES: u64 = 64 << 20;
 /// Without knowledge of an adapter's memory, this much of it is used.
@@ -167,6 +169,15 @@ impl Adapter {
         ))
     }
 
+    fn top_threads(&self) -> u32 {
+        let limits = self.adapter.limits();
+        let bytes = GROUP_BYTES / GROUP_THREADS * TOP_THREADS;
+        let fits = limits.max_compute_invocations_per_workgroup >= TOP_THREADS
+            && limits.max_compute_workgroup_size_x >= TOP_THREADS
+            && limits.max_compute_workgroup_storage_size >= bytes;
+        if fits { TOP_THREADS } else { GROUP_THREADS }
+    }
+
     /// Opens it.
     pub(super) fn open(&self) -> Result<Gpu, DeviceError> {
         let lost = |why: String| DeviceError::Lost { device: self.name(), why };
@@ -191,6 +202,7 @@ impl Adapter {
             binding_bytes: self.binding_bytes(),
             groups_most: self.adapter.limits().max_compute_workgroups_per_dimension,
             features: self.used_features(),
+            top_threads: self.top_threads(),
             device,
             queue,
             trouble,
@@ -214,6 +226,8 @@ pub(super) struct Gpu {
     /// Workgroups in one direction at most.
     pub(super) groups_most: u32,
     pub(super) features: wgpu::Features,
+    /// Threads of the workgroups that fit the tops of trees.
+    pub(super) top_threads: u32,
     /// Set from callbacks: a device that is lost answers every call as if nothing were wrong.
     trouble: Arc<Mutex<Option<String>>>,
 }

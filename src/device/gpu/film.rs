@@ -86,12 +86,19 @@ pub(super) fn take_out(
     let film = pool.install(|| match output {
         Output::Codes { .. } => Film::of_codes(shot.size, codes(words(&layout.film))),
         Output::Linear => {
-            let mut film = Film::new(shot.size, shot.alpha, shot.aovs);
-            let floats = bytemuck::cast_slice(of(&layout.film));
-            if film_words(shot, output) == 3 {
-                fill_rgb(&mut film, floats);
+            let floats: &[f32] = bytemuck::cast_slice(of(&layout.film));
+            let pixels = shot.size[0] as usize * shot.size[1] as usize;
+            let words_each = film_words(shot, output) as usize;
+            let (pixel_floats, albedo) = floats.split_at(words_each * pixels);
+            let mut film = Film::without_rgb(shot.size, shot.alpha, shot.aovs);
+            if words_each == 3 {
+                let rows = pixel_floats.as_chunks::<3>().0;
+                film.rgb = rows.par_iter().with_min_len(GRAIN).copied().collect();
             } else {
-                fill_rgb_through(&mut film, floats);
+                fill_rgb_through(&mut film, pixel_floats);
+            }
+            if let Some(to) = &mut film.aovs.albedo {
+                to.copy_from_slice(albedo.as_chunks::<3>().0);
             }
             fill_center(&mut film, words(&layout.center));
             film
@@ -105,47 +112,22 @@ pub(super) fn take_out(
 
 /// Three bytes a pixel of words of which each is one.
 fn codes(words: &[u32]) -> Vec<u8> {
-    let mut codes = vec![0; 3 * words.len()];
-    codes.par_chunks_mut(3 * GRAIN).zip(words.par_chunks(GRAIN)).for_each(|(codes, words)| {
-        for (code, word) in codes.as_chunks_mut::<3>().0.iter_mut().zip(words) {
-            let [r, g, b, _] = word.to_le_bytes();
-            *code = [r, g, b];
-        }
-    });
-    codes
+    let code = |word: &u32| {
+        let [r, g, b, _] = word.to_le_bytes();
+        [r, g, b]
+    };
+    // collected, not filled in: zeros would be written first
+    words.par_iter().with_min_len(GRAIN).map(code).collect::<Vec<[u8; 3]>>().into_flattened()
 }
 
-/// Linear RGB, then the albedo where there is one.
-fn fill_rgb(film: &mut Film, floats: &[f32]) {
-    let (rows, albedo) = floats.split_at(3 * film.rgb.len());
-    let rows = rows.as_chunks::<3>().0;
-    film.rgb
-        .par_chunks_mut(GRAIN)
-        .zip(rows.par_chunks(GRAIN))
-        .for_each(|(to, rows)| to.copy_from_slice(rows));
-    fill_albedo(film, albedo);
-}
-
-/// Linear RGB and what the background counts for, then the albedo where there is one.
+/// Linear RGB and what the background counts for.
 fn fill_rgb_through(film: &mut Film, floats: &[f32]) {
-    let (rows, albedo) = floats.split_at(4 * film.rgb.len());
-    let rows = rows.as_chunks::<4>().0;
-    film.rgb.par_chunks_mut(GRAIN).zip(rows.par_chunks(GRAIN)).for_each(|(to, rows)| {
-        for (to, [r, g, b, _]) in to.iter_mut().zip(rows) {
-            *to = [*r, *g, *b];
-        }
-    });
+    let rows = floats.as_chunks::<4>().0;
+    film.rgb = rows.par_iter().with_min_len(GRAIN).map(|[r, g, b, _]| [*r, *g, *b]).collect();
     for share in [&mut film.alpha, &mut film.aovs.coverage].into_iter().flatten() {
         for (to, [.., through]) in share.iter_mut().zip(rows) {
             *to = 1.0 - through;
         }
-    }
-    fill_albedo(film, albedo);
-}
-
-fn fill_albedo(film: &mut Film, albedo: &[f32]) {
-    if let Some(to) = &mut film.aovs.albedo {
-        to.copy_from_slice(albedo.as_chunks::<3>().0);
     }
 }
 

@@ -371,6 +371,7 @@ impl Ground<'_> {
             triangles.buffer().as_entire_binding(),
             held(&self.buffers.boxes).as_entire_binding(),
             held(&self.buffers.costs).as_entire_binding(),
+            words.buffer().as_entire_binding(),
         ];
         let group = bind_group(self.gpu, &self.pipelines.refit_layout, resources);
         let timestamp_writes = timed.map(|query_set| wgpu::ComputePassTimestampWrites {

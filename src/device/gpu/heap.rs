@@ -44,8 +44,11 @@ impl Heap {
         u64::from(self.capacity) * self.unit_bytes
     }
 
-    /// Takes a place of so many units: the first that is large enough, else the buffer grows.
+    /// Takes a place of so many units, which begins at a multiple of four units: the first that is large enough, else the
+    /// buffer grows.
     pub(super) fn take(&mut self, gpu: &Gpu, units: u64) -> Result<Range<u32>, Full> {
+        // all places have multiples of four, so that all begin at one
+        let units = units.next_multiple_of(4);
         let fits = |(_, length): &(&u32, &u32)| u64::from(**length) >= units;
         let start = match self.free.iter().find(fits) {
             Some((&start, _)) => start,

@@ -1,6 +1,6 @@
 //! Kernels made ready: layouts of bindings, and a pipeline for each set of what frames have.
 
-use super::adapter::Gpu;
+use super::adapter::{GROUP_THREADS, Gpu};
 use super::scene::Has;
 use super::shaders;
 use std::collections::HashMap;
@@ -41,9 +41,9 @@ impl Pipelines {
             SLICE => (wgpu::BufferBindingType::Uniform, true),
             _ => (storage(binding < FILM), false),
         });
-        let refit_layout = layout(gpu, "refit", 7, |binding| match binding {
+        let refit_layout = layout(gpu, "refit", 8, |binding| match binding {
             0 => (wgpu::BufferBindingType::Uniform, true),
-            _ => (storage(binding < 3), false),
+            _ => (storage(binding < 3 || binding == 7), false),
         });
         let pipelines = |label: &str, layout: &wgpu::BindGroupLayout| {
             gpu.device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
@@ -55,10 +55,12 @@ impl Pipelines {
         let trace_pipelines = pipelines("trace", &trace_layout);
         let refit_pipelines = pipelines("refit", &refit_layout);
         let refit = module(gpu, "refit", &shaders::refit());
-        let fit = |entry: &str| pipeline(gpu, &refit_pipelines, &refit, entry, &[]);
+        let fit = |entry: &str, threads: u32| {
+            pipeline(gpu, &refit_pipelines, &refit, entry, &[("GROUP", f64::from(threads))])
+        };
         Self {
-            refit_level: fit("refit_level"),
-            refit_top: fit("refit_top"),
+            refit_level: fit("refit_level", GROUP_THREADS),
+            refit_top: fit("refit_top", gpu.top_threads),
             trace_module: module(gpu, "trace", &shaders::trace()),
             center_module: None,
             trace_layout,
@@ -84,7 +86,7 @@ impl Pipelines {
     }
 }
 
-fn constants(has: Has) -> [(&'static str, f64); 8] {
+fn constants(has: Has) -> [(&'static str, f64); 9] {
     let flags = [
         ("SINGLE_TREE", has.single_tree),
         ("HAS_BRANCHES", has.branches),
@@ -93,10 +95,11 @@ fn constants(has: Has) -> [(&'static str, f64); 8] {
         ("HAS_TRANSPARENCY", has.transparency),
         ("GOES_ON", has.goes_on),
         ("HAS_ALBEDO", has.albedo),
+        ("HAS_ONE_LIGHT", has.one_light),
     ]
     .map(|(name, is_set)| (name, f64::from(u8::from(is_set))));
-    let [a, b, c, d, e, f, g] = flags;
-    [a, b, c, d, e, f, g, ("FILM_WORDS", f64::from(has.film_words))]
+    let [a, b, c, d, e, f, g, h] = flags;
+    [a, b, c, d, e, f, g, h, ("FILM_WORDS", f64::from(has.film_words))]
 }
 
 fn storage(read_only: bool) -> wgpu::BufferBindingType {

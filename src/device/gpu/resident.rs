@@ -15,7 +15,7 @@ use std::collections::HashMap;
 use std::ops::Range;
 
 /// Nodes that one workgroup fits height after height, at most.
-const TOP_NODES: u32 = 256;
+const TOP_NODES: u32 = 64;
 /// A GPU traces so fast that a tree is worth more than the least work; no splits: a tree is refitted.
 const QUALITY: Quality = Quality::Medium;
 /// Triangles whose vertices one thread looks up together.
@@ -318,7 +318,7 @@ impl Resident {
         let top = tree.heights.iter().position(|h| last - h.start <= TOP_NODES).unwrap_or(tree.heights.len());
         let record = RefitTree {
             positions,
-            vertices: tree.vertices.start,
+            vertices: tree.vertices.start / 4,
             by_height: tree.lists.start,
             heights: tree.lists.start + last,
             height_count: tree.heights.len() as u32,

@@ -32,6 +32,7 @@ pub(super) struct Has {
     pub(super) transparency: bool,
     pub(super) goes_on: bool,
     pub(super) albedo: bool,
+    pub(super) one_light: bool,
     /// Words of the film for each pixel.
     pub(super) film_words: u32,
 }
@@ -192,6 +193,7 @@ fn has(world: &World, shot: &Shot, lights: &[LightRecord], has_picture: bool, is
         transparency: !world.is_opaque,
         goes_on: all().any(lets_through),
         albedo: shot.aovs.contains(Aov::Albedo),
+        one_light: lights.len() == 1 && lights[0].kind != AREA,
         film_words: 0,
     }
 }
