@@ -268,5 +268,9 @@ fn refit_top(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_
         let low = boxes[at];
         let whole = half_area(Aabb(low.xyz, boxes[at + 1u].xyz));
         costs[level.tree + group.x] = select(0.0, low.w / whole, whole > 0.0);
+        // before the root stands the box of all
+        let before = 5u * (tree.first_node - 1u);
+        nodes[before] = vec4<u32>(bitcast<vec3<u32>>(low.xyz), 0u);
+        nodes[before + 1u] = vec4<u32>(bitcast<vec3<u32>>(boxes[at + 1u].xyz), 0u);
     }
 }

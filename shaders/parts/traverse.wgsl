@@ -196,6 +196,14 @@ fn search_along(world: Ray, any: bool, search: ptr<function, Search>) {
     if (shot.object_count == 0u || group.x == ABSENT) {
         return;
     }
+    if (SINGLE_TREE && !any) {
+        // before the root stands the box of all: most rays of many a picture end here
+        let row = 5u * (group.x - 1u);
+        let whole = Aabb(bitcast<vec3<f32>>(nodes[row].xyz), bitcast<vec3<f32>>(nodes[row + 1u].xyz));
+        if (box_entry(whole, ray.origin, ray.inverse) < 0.0) {
+            return;
+        }
+    }
     loop {
         var leaves = vec2<u32>(0u);
         if (group.y > 0x00ffffffu) {

@@ -62,6 +62,7 @@ enum Place {
 pub(super) struct GpuTree {
     /// Stays where its name changes.
     mark: u64,
+    /// In the first one's place stands the box of all; then comes the root.
     nodes: Range<u32>,
     triangles: Range<u32>,
     vertices: Range<u32>,
@@ -77,7 +78,7 @@ pub(super) struct GpuTree {
 impl GpuTree {
     /// Its root in the nodes, and the first of its triangles.
     pub(super) fn root(&self) -> (u32, u32) {
-        if self.nodes.is_empty() { (ABSENT, 0) } else { (self.nodes.start, self.triangles.start) }
+        if self.heights.is_empty() { (ABSENT, 0) } else { (self.nodes.start + 1, self.triangles.start) }
     }
 }
 
@@ -278,16 +279,17 @@ impl Resident {
         means: &Means,
     ) -> Result<GpuTree, DeviceError> {
         let PackedTree { mut nodes, order, by_height, heights, .. } = packed;
-        let place_nodes = self.take(means, |heaps| &mut heaps.nodes, nodes.len() as u64)?;
+        let place_nodes = self.take(means, |heaps| &mut heaps.nodes, 1 + nodes.len() as u64)?;
+        let root = place_nodes.start + 1;
         let place_triangles = self.take(means, |heaps| &mut heaps.triangles, order.len() as u64)?;
         let place_vertices = self.take(means, |heaps| &mut heaps.words, 4 * order.len() as u64)?;
         let mut lists = by_height;
         lists.extend(heights.iter().map(|h| h.start));
         lists.extend(heights.last().map(|h| h.end));
         let place_lists = self.take(means, |heaps| &mut heaps.words, lists.len() as u64)?;
-        move_nodes(&mut nodes, place_nodes.start, place_triangles.start);
+        move_nodes(&mut nodes, root, place_triangles.start);
         let gpu = means.gpu;
-        self.heaps.nodes.write(gpu, place_nodes.start, bytemuck::cast_slice(&nodes));
+        self.heaps.nodes.write(gpu, root, bytemuck::cast_slice(&nodes));
         let vertices = vertices(&order, means.pool);
         self.heaps.words.write(gpu, place_vertices.start, bytemuck::cast_slice(&vertices));
         self.heaps.words.write(gpu, place_lists.start, bytemuck::cast_slice(&lists));
@@ -310,7 +312,7 @@ impl Resident {
         else {
             return;
         };
-        if tree.nodes.is_empty() {
+        if tree.heights.is_empty() {
             return;
         }
         // the nodes from this height on are few
@@ -323,7 +325,7 @@ impl Resident {
             heights: tree.lists.start + last,
             height_count: tree.heights.len() as u32,
             top_height: top as u32,
-            first_node: tree.nodes.start,
+            first_node: tree.nodes.start + 1,
             first_triangle: tree.triangles.start,
             first_box: 0,
             pad_a: 0,
