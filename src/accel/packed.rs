@@ -76,8 +76,9 @@ impl PackedTree {
 
     /// Bytes that it takes on a device: nodes, corners and numbers of triangles, and what a refit needs.
     pub fn device_bytes(&self) -> u64 {
-        self.nodes.len() as u64 * (NODE_BYTES + 4)
-            + self.order.len() as u64 * (TRIANGLE_BYTES + VERTICES_BYTES)
+        // before the root stands the box of all
+        let nodes = 1 + self.nodes.len() as u64;
+        nodes * (NODE_BYTES + 4) + self.order.len() as u64 * (TRIANGLE_BYTES + VERTICES_BYTES)
     }
 }
 

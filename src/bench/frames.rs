@@ -22,8 +22,8 @@ use std::sync::Arc;
 const POSES: u32 = 24;
 /// Frames that are measured, after as many poses unmeasured.
 const FRAMES: usize = 120;
-/// Frames before those that are measured, at least.
-const WARM: usize = 60;
+/// How long frames are rendered before those that are measured, ms: clocks rise, kernels are made.
+const WARM_MS: f64 = 400.0;
 /// Around and from pole to pole: of the peer's sphere, 147,456 triangles, and of one of 1,048,576.
 const SPHERE: [u32; 2] = [384, 192];
 const LARGE_SPHERE: [u32; 2] = [1024, 512];
@@ -171,9 +171,14 @@ fn run(
     let mut ran = Ran::default();
     let mut uploads = VecDeque::new();
     let mut clock = Stopwatch::start();
-    // clocks rise, kernels are made
-    let warm = frames.len().max(WARM);
-    for i in 0..warm + count {
+    let mut warm = usize::MAX;
+    for i in 0.. {
+        if warm == usize::MAX && i >= frames.len() && clock.ms() > WARM_MS {
+            warm = i;
+        }
+        if i >= warm.saturating_add(count) {
+            break;
+        }
         if i == warm {
             while !uploads.is_empty() {
                 ran.take(device, &mut uploads, false)?;
