@@ -57,13 +57,23 @@ fn is_finite(v: vec3<f32>) -> bool {
     return all(exponents != vec3<u32>(INFINITE_BITS));
 }
 
-// Whether a triangle can be hit: its edges are scaled, so that neither tiny nor huge ones leave the range of f32.
+// Whether a triangle can be hit.
 fn has_area(a: vec3<f32>, b: vec3<f32>, c: vec3<f32>) -> bool {
     if (!is_finite(a) || !is_finite(b) || !is_finite(c)) {
         return false;
     }
     let e = b * 0.5 - a * 0.5;
     let f = c * 0.5 - a * 0.5;
+    // most have: the normal is far above its roundings and far within the range of f32
+    let p = e.yzx * f.zxy;
+    let q = e.zxy * f.yzx;
+    let normal = abs(p - q);
+    let terms = abs(p) + abs(q);
+    let size = normal.x + normal.y + normal.z;
+    if (size > (terms.x + terms.y + terms.z) * 0.00000095367431640625 && size > 1e-30 && size < 1e30) {
+        return true;
+    }
+    // edges are scaled, so that neither tiny nor huge ones leave that range
     let size_e = max(abs(e.x), max(abs(e.y), abs(e.z)));
     let size_f = max(abs(f.x), max(abs(f.y), abs(f.z)));
     if (size_e == 0.0 || size_f == 0.0) {
@@ -105,9 +115,10 @@ fn fit_triangle(tree: RefitTree, place: u32) -> Aabb {
         b = a;
         c = a;
     }
-    triangles[3u * place] = vec4<u32>(bitcast<vec3<u32>>(a), number);
-    triangles[3u * place + 1u] = vec4<u32>(bitcast<vec3<u32>>(b), 0u);
-    triangles[3u * place + 2u] = vec4<u32>(bitcast<vec3<u32>>(c), 0u);
+    // by axes, so that a ray takes them in the order of its own
+    triangles[3u * place] = vec4<u32>(bitcast<vec3<u32>>(vec3<f32>(a.x, b.x, c.x)), number);
+    triangles[3u * place + 1u] = vec4<u32>(bitcast<vec3<u32>>(vec3<f32>(a.y, b.y, c.y)), number);
+    triangles[3u * place + 2u] = vec4<u32>(bitcast<vec3<u32>>(vec3<f32>(a.z, b.z, c.z)), number);
     return box;
 }
 

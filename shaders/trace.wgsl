@@ -1,10 +1,10 @@
 // The film: one thread takes some of a pixel's samples, the pixel's lanes are added up in the workgroup. Twin of
 // src/kernel/tile.rs.
 
-var<workgroup> lane_sums: array<vec4<f32>, 64>;
-var<workgroup> lane_albedos: array<vec3<f32>, 64>;
+var<workgroup> lane_sums: array<vec4<f32>, GROUP>;
+var<workgroup> lane_albedos: array<vec3<f32>, GROUP>;
 // The words of the tile's pixels, row by row.
-var<workgroup> tile_words: array<u32, 256>;
+var<workgroup> tile_words: array<u32, 4u * GROUP>;
 
 // Every other bit of a number of up to six, from the lowest on.
 fn even_bits(number: u32) -> u32 {
@@ -28,7 +28,7 @@ fn code_of(x: f32) -> u32 {
     return code;
 }
 
-@compute @workgroup_size(64)
+@compute @workgroup_size(GROUP)
 fn trace(
     @builtin(workgroup_id) group: vec3<u32>,
     @builtin(num_workgroups) groups: vec3<u32>,
@@ -36,13 +36,13 @@ fn trace(
 ) {
     thread_in_group = local;
     if (HAS_BRANCHES) {
-        waiting_thread = (group.y * groups.x + group.x) * 64u + local;
-        waiting_threads = groups.x * groups.y * 64u;
+        waiting_thread = (group.y * groups.x + group.x) * GROUP + local;
+        waiting_threads = groups.x * groups.y * GROUP;
     }
     // a group's pixels lie in Morton order in a tile that is as wide as high, or twice as wide
     let lanes = slice.lanes;
     let number = local / lanes;
-    let bits = countTrailingZeros(64u / lanes);
+    let bits = countTrailingZeros(GROUP / lanes);
     let pixel = vec2<u32>(
         (group.x << ((bits + 1u) / 2u)) + even_bits(number),
         slice.first_row + (group.y << (bits / 2u)) + even_bits(number >> 1u),
@@ -96,7 +96,7 @@ fn trace(
     let columns = 1u << ((bits + 1u) / 2u);
     let corner = vec2<u32>(group.x * columns, slice.first_row + (group.y << (bits / 2u)));
     let row_words = FILM_WORDS * columns;
-    for (var word = local; word < FILM_WORDS * 64u / lanes; word += 64u) {
+    for (var word = local; word < FILM_WORDS * GROUP / lanes; word += GROUP) {
         let row = corner.y + word / row_words;
         let column_word = word % row_words;
         let is_in_row = corner.x + column_word / FILM_WORDS < shot.size.x;

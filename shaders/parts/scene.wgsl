@@ -202,7 +202,7 @@ const REFLECTION_CUBE: u32 = 2u;
 @group(0) @binding(7) var<storage, read> objects: array<ObjectRecord>;
 // Small lists of this frame.
 @group(0) @binding(8) var<storage, read> tables: array<u32>;
-// Trees: five rows a node, three rows a triangle.
+// Trees: five rows a node; three rows a triangle, one for each axis: the three corners, and the triangle's number.
 @group(0) @binding(9) var<storage, read> nodes: array<vec4<u32>>;
 @group(0) @binding(10) var<storage, read> triangles: array<vec4<u32>>;
 // Indices and attributes.
@@ -231,6 +231,9 @@ override HAS_ALBEDO: bool = true;
 // Words of the film for each pixel: 1 for codes of 8 bits on the sRGB curve, 3 for linear RGB, 4 with what the background
 // counts for.
 override FILM_WORDS: u32 = 4u;
+
+// Threads of a workgroup that traces.
+const GROUP: u32 = 64u;
 
 struct Ray {
     origin: vec3<f32>,

@@ -4,10 +4,11 @@
 override SINGLE_TREE: bool = false;
 
 // A group of children that wait: the first one's place and which of them were entered; the first entries of each thread's
-// stack are in the workgroup's memory, the others in its own.
+// stack are in the workgroup's memory, the others in its own, which is cleared for each thread: as many as a frame's trees
+// need, see `far` in src/device/gpu/shaders.rs.
 const NEAR: u32 = 6u;
 const FAR: u32 = 44u;
-var<workgroup> near_stack: array<vec2<u32>, 384>;
+var<workgroup> near_stack: array<vec2<u32>, NEAR * GROUP>;
 var<private> far_stack: array<vec2<u32>, FAR>;
 // Set by each kernel before it traces.
 var<private> thread_in_group: u32;
@@ -137,33 +138,38 @@ fn test_triangle(
     any: bool,
     search: ptr<function, Search>,
 ) -> bool {
-    let row_a = triangles[3u * place];
-    let row_b = triangles[3u * place + 1u];
-    let row_c = triangles[3u * place + 2u];
-    let a = bitcast<vec3<f32>>(row_a.xyz);
-    let b = bitcast<vec3<f32>>(row_b.xyz);
-    let c = bitcast<vec3<f32>>(row_c.xyz);
-    let in_plane = hit_in_plane(ray.shear, a, b, c);
+    // the sheared axes are rows
+    let row = 3u * place;
+    let row_x = triangles[row + ray.shear.axes.x];
+    let row_y = triangles[row + ray.shear.axes.y];
+    let row_z = triangles[row + ray.shear.axes.z];
+    let in_plane = hit_in_plane(
+        ray.shear,
+        bitcast<vec3<f32>>(row_x.xyz),
+        bitcast<vec3<f32>>(row_y.xyz),
+        bitcast<vec3<f32>>(row_z.xyz),
+    );
     if (!(in_plane.distance > 0.0 && in_plane.distance <= (*search).before.distance)) {
         return false;
     }
-    let entry = box_entry(own_box(a, b, c), ray.origin, ray.inverse);
+    let corners = corners_at(place);
+    let entry = box_entry(own_box(corners[0], corners[1], corners[2]), ray.origin, ray.inverse);
     if (entry < 0.0) {
         return false;
     }
-    let candidate = HitOrder(max(in_plane.distance, entry), first_primitive + row_a.w);
+    let candidate = HitOrder(max(in_plane.distance, entry), first_primitive + row_x.w);
     if (!precedes((*search).after, candidate) || !precedes(candidate, (*search).before)) {
         return false;
     }
     if (HAS_TRANSPARENCY && any) {
-        if (is_clear(object, row_a.w)) {
+        if (is_clear(object, row_x.w)) {
             (*search).is_clear = true;
             return false;
         }
     }
     (*search).before = candidate;
     (*search).object = object;
-    (*search).triangle = row_a.w;
+    (*search).triangle = row_x.w;
     (*search).place = place;
     (*search).barycentric = in_plane.barycentric;
     return true;
@@ -211,7 +217,7 @@ fn search_along(world: Ray, any: bool, search: ptr<function, Search>) {
             group.y &= ~(1u << bit);
             if (group.y > 0x00ffffffu) {
                 if (size < NEAR) {
-                    near_stack[size * 64u + thread_in_group] = group;
+                    near_stack[size * GROUP + thread_in_group] = group;
                 } else {
                     far_stack[min(size - NEAR, FAR - 1u)] = group;
                 }
@@ -242,7 +248,7 @@ fn search_along(world: Ray, any: bool, search: ptr<function, Search>) {
                 // what is left of this node waits
                 if (group.y > 0x00ffffffu) {
                     if (size < NEAR) {
-                        near_stack[size * 64u + thread_in_group] = group;
+                        near_stack[size * GROUP + thread_in_group] = group;
                     } else {
                         far_stack[min(size - NEAR, FAR - 1u)] = group;
                     }
@@ -250,7 +256,7 @@ fn search_along(world: Ray, any: bool, search: ptr<function, Search>) {
                 }
                 if (leaves.y != 0u) {
                     if (size < NEAR) {
-                        near_stack[size * 64u + thread_in_group] = leaves;
+                        near_stack[size * GROUP + thread_in_group] = leaves;
                     } else {
                         far_stack[min(size - NEAR, FAR - 1u)] = leaves;
                     }
@@ -279,7 +285,7 @@ fn search_along(world: Ray, any: bool, search: ptr<function, Search>) {
             }
             size -= 1u;
             if (size < NEAR) {
-                group = near_stack[size * 64u + thread_in_group];
+                group = near_stack[size * GROUP + thread_in_group];
             } else {
                 group = far_stack[min(size - NEAR, FAR - 1u)];
             }
@@ -301,12 +307,17 @@ fn all_children(node: u32, turn: u32) -> Entered {
     );
 }
 
+// What was found.
+fn hit_of(search: Search) -> Hit {
+    return Hit(search.before.distance, search.object, search.triangle, search.place, search.barycentric);
+}
+
 // The first candidate after a place of the order.
 fn closest(ray: Ray, after: HitOrder) -> Hit {
     let end = HitOrder(bitcast<f32>(INFINITE_BITS), 0u);
     var search = Search(after, end, ABSENT, 0u, 0u, vec2<f32>(0.0), false);
     search_along(ray, false, &search);
-    return Hit(search.before.distance, search.object, search.triangle, search.place, search.barycentric);
+    return hit_of(search);
 }
 
 // What a shadow ray meets: nothing, something that lets no light through, or else only what may let some through.
@@ -326,10 +337,12 @@ fn meets(ray: Ray, end: f32) -> u32 {
 
 // The corners of the triangle that was hit, in its object's space.
 fn corners_of(hit: Hit) -> array<vec3<f32>, 3> {
-    let row = 3u * hit.place;
-    return array<vec3<f32>, 3>(
-        bitcast<vec3<f32>>(triangles[row].xyz),
-        bitcast<vec3<f32>>(triangles[row + 1u].xyz),
-        bitcast<vec3<f32>>(triangles[row + 2u].xyz),
-    );
+    return corners_at(hit.place);
+}
+
+fn corners_at(place: u32) -> array<vec3<f32>, 3> {
+    let x = bitcast<vec4<f32>>(triangles[3u * place]);
+    let y = bitcast<vec4<f32>>(triangles[3u * place + 1u]);
+    let z = bitcast<vec4<f32>>(triangles[3u * place + 2u]);
+    return array<vec3<f32>, 3>(vec3<f32>(x.x, y.x, z.x), vec3<f32>(x.y, y.y, z.y), vec3<f32>(x.z, y.z, z.z));
 }

@@ -8,8 +8,9 @@
 
 // A ray as the edge test wants it: its largest component is along the last axis, the others are sheared away.
 struct ShearRay {
-    last_axis: u32,
-    // In the order of the sheared axes.
+    // The axes (x, y, z) of the sheared space.
+    axes: vec3<u32>,
+    // In their order.
     origin: vec3<f32>,
     shear: vec3<f32>,
 }
@@ -21,18 +22,13 @@ fn shear_ray(ray: Ray) -> ShearRay {
         last = 0u;
     }
     let d = sheared_axes(last, ray.direction);
-    return ShearRay(last, sheared_axes(last, ray.origin), vec3<f32>(d.x / d.z, d.y / d.z, 1.0 / d.z));
+    let axes = select(select(vec3<u32>(0u, 1u, 2u), vec3<u32>(2u, 0u, 1u), last == 1u), vec3<u32>(1u, 2u, 0u), last == 0u);
+    return ShearRay(axes, sheared_axes(last, ray.origin), vec3<f32>(d.x / d.z, d.y / d.z, 1.0 / d.z));
 }
 
 // Coordinates in the order of the axes of the sheared space.
 fn sheared_axes(last: u32, v: vec3<f32>) -> vec3<f32> {
     return select(select(v, v.zxy, last == 1u), v.yzx, last == 0u);
-}
-
-// A vertex as seen along the ray.
-fn project(ray: ShearRay, vertex: vec3<f32>) -> vec3<f32> {
-    let v = sheared_axes(ray.last_axis, vertex) - ray.origin;
-    return vec3<f32>(fma(-ray.shear.x, v.z, v.x), fma(-ray.shear.y, v.z, v.y), v.z);
 }
 
 // What a ray meets in a triangle's plane inside of its edges.
@@ -42,19 +38,21 @@ struct InPlane {
     barycentric: vec2<f32>,
 }
 
-fn hit_in_plane(ray: ShearRay, corner_a: vec3<f32>, corner_b: vec3<f32>, corner_c: vec3<f32>) -> InPlane {
-    let a = project(ray, corner_a);
-    let b = project(ray, corner_b);
-    let c = project(ray, corner_c);
-    let u = difference_of_products(c.x, b.y, c.y, b.x);
-    let v = difference_of_products(a.x, c.y, a.y, c.x);
-    let w = difference_of_products(b.x, a.y, b.y, a.x);
+// The corners' coordinates along each sheared axis.
+fn hit_in_plane(ray: ShearRay, along_x: vec3<f32>, along_y: vec3<f32>, along_z: vec3<f32>) -> InPlane {
+    // the corners as seen along the ray
+    let z = along_z - ray.origin.z;
+    let x = fma(vec3<f32>(-ray.shear.x), z, along_x - ray.origin.x);
+    let y = fma(vec3<f32>(-ray.shear.y), z, along_y - ray.origin.y);
+    let u = difference_of_products(x.z, y.y, y.z, x.y);
+    let v = difference_of_products(x.x, y.z, y.x, x.z);
+    let w = difference_of_products(x.y, y.x, y.y, x.x);
     let is_inside = (u >= 0.0 && v >= 0.0 && w >= 0.0) || (u <= 0.0 && v <= 0.0 && w <= 0.0);
     let determinant = (u + v) + w;
     if (!is_inside || determinant == 0.0) {
         return InPlane(-1.0, vec2<f32>(0.0));
     }
-    let depth = fma(u, a.z, fma(v, b.z, w * c.z));
+    let depth = fma(u, z.x, fma(v, z.y, w * z.z));
     return InPlane(depth / determinant * ray.shear.z, vec2<f32>(v / determinant, w / determinant));
 }
 

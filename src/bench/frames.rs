@@ -22,7 +22,7 @@ use std::sync::Arc;
 const POSES: u32 = 24;
 /// Frames that are measured, after as many poses unmeasured.
 const FRAMES: usize = 120;
-/// How long frames are rendered before those that are measured, ms: clocks rise, kernels are made.
+/// How long frames are rendered before those that are measured, ms: clocks rise.
 const WARM_MS: f64 = 400.0;
 /// Around and from pole to pole: of the peer's sphere, 147,456 triangles, and of one of 1,048,576.
 const SPHERE: [u32; 2] = [384, 192];
@@ -173,6 +173,10 @@ fn run(
     let mut clock = Stopwatch::start();
     let mut warm = usize::MAX;
     for i in 0.. {
+        if i == 1 {
+            // the first one may wait for kernels
+            clock = Stopwatch::start();
+        }
         if warm == usize::MAX && i >= frames.len() && clock.ms() > WARM_MS {
             warm = i;
         }

@@ -18,8 +18,7 @@ pub(super) struct Pipelines {
     pub(super) trace_layout: wgpu::BindGroupLayout,
     pub(super) refit_layout: wgpu::BindGroupLayout,
     trace_pipelines: wgpu::PipelineLayout,
-    trace_module: wgpu::ShaderModule,
-    center_module: Option<wgpu::ShaderModule>,
+    modules: HashMap<(Kernel, u32), wgpu::ShaderModule>,
     pub(super) refit_level: wgpu::ComputePipeline,
     pub(super) refit_top: wgpu::ComputePipeline,
     made: HashMap<(Kernel, Has), wgpu::ComputePipeline>,
@@ -61,8 +60,7 @@ impl Pipelines {
         Self {
             refit_level: fit("refit_level", GROUP_THREADS),
             refit_top: fit("refit_top", gpu.top_threads),
-            trace_module: module(gpu, "trace", &shaders::trace()),
-            center_module: None,
+            modules: HashMap::new(),
             trace_layout,
             refit_layout,
             trace_pipelines,
@@ -72,15 +70,14 @@ impl Pipelines {
 
     /// The pipeline for frames that have this.
     pub(super) fn tracing(&mut self, gpu: &Gpu, kernel: Kernel, has: Has) -> &wgpu::ComputePipeline {
-        let Self { trace_pipelines, trace_module, center_module, made, .. } = self;
+        let Self { trace_pipelines, modules, made, .. } = self;
         made.entry((kernel, has)).or_insert_with(|| {
-            let (module, entry) = match kernel {
-                Kernel::Trace => (&*trace_module, "trace"),
-                Kernel::Center => {
-                    let make = || module(gpu, "center", &shaders::center());
-                    (&*center_module.get_or_insert_with(make), "center")
-                }
+            let (entry, text): (_, fn(u32) -> String) = match kernel {
+                Kernel::Trace => ("trace", shaders::trace),
+                Kernel::Center => ("center", shaders::center),
             };
+            let module =
+                modules.entry((kernel, has.far)).or_insert_with(|| module(gpu, entry, &text(has.far)));
             pipeline(gpu, trace_pipelines, module, entry, &constants(has))
         })
     }

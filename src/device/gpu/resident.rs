@@ -76,6 +76,11 @@ pub(super) struct GpuTree {
 }
 
 impl GpuTree {
+    /// Levels of its nodes.
+    pub(super) fn levels(&self) -> usize {
+        self.heights.len()
+    }
+
     /// Its root in the nodes, and the first of its triangles.
     pub(super) fn root(&self) -> (u32, u32) {
         if self.heights.is_empty() { (ABSENT, 0) } else { (self.nodes.start + 1, self.triangles.start) }

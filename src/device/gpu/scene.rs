@@ -5,6 +5,7 @@ use super::records::{
     MapRecord, ObjectRecord, PLACED, ShotConstants,
 };
 use super::resident::Resident;
+use super::shaders::far;
 use crate::accel::{Aabb, PackedNode, PackedTop, Placement};
 use crate::device::Output;
 use crate::film::{Srgb8, gain_from_stops};
@@ -33,6 +34,8 @@ pub(super) struct Has {
     pub(super) goes_on: bool,
     pub(super) albedo: bool,
     pub(super) one_light: bool,
+    /// Entries of stacks in threads' own memory.
+    pub(super) far: u32,
     /// Words of the film for each pixel.
     pub(super) film_words: u32,
 }
@@ -69,12 +72,13 @@ impl Records {
         let mut tables = Vec::new();
         let mut objects = Vec::with_capacity(frame.objects.len());
         let mut boxes = Vec::with_capacity(frame.objects.len());
-        let mut first_primitive = 0_u32;
+        let (mut first_primitive, mut levels) = (0_u32, 0);
         for (i, object) in frame.objects.iter().enumerate() {
             let geometry = &*object.geometry;
             let tree = resident.tree(geometry).ok_or(i)?;
             let mut record = ObjectRecord::zeroed();
             (record.root, record.first_triangle) = tree.root();
+            levels = levels.max(tree.levels());
             record.first_primitive = first_primitive;
             first_primitive = first_primitive.wrapping_add(geometry.triangles.0.len() as u32);
             lists(&mut record, &mut tables, geometry, &world, i);
@@ -123,6 +127,7 @@ impl Records {
         };
         let has = Has {
             film_words: film_words(shot, output),
+            far: far(levels, top.tree.heights.len()),
             ..has(&world, shot, &lights, background_map != ABSENT, is_single)
         };
         let shot = ShotConstants {
@@ -195,6 +200,7 @@ fn has(world: &World, shot: &Shot, lights: &[LightRecord], has_picture: bool, is
         albedo: shot.aovs.contains(Aov::Albedo),
         one_light: lights.len() == 1 && lights[0].kind != AREA,
         film_words: 0,
+        far: 0,
     }
 }
 

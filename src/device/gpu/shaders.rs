@@ -35,14 +35,33 @@ const TRACING: &[&str] = &[
     part!("parts/branch.wgsl"),
 ];
 
-/// The kernel that traces a picture.
-pub fn trace() -> String {
-    joined(TRACING, part!("trace.wgsl"))
+/// Entries of a thread's stack that are in the workgroup's memory: `NEAR` in shaders/parts/traverse.wgsl.
+const NEAR: usize = 6;
+/// Numbers of further entries for which there are kernels: of their own memory threads clear all before they begin, which for
+/// the largest takes as long as a tenth of tracing. The last is enough for all trees.
+pub const FARS: [u32; 4] = [2, 8, 20, 44];
+
+/// The least of [`FARS`] for rays through trees of so many levels, below a top level of so many (0: there is none). A ray leaves
+/// one group of children for each level that it goes down; where an object is entered, its siblings and what stands in the
+/// same leaves wait, too.
+pub fn far(levels: usize, top_levels: usize) -> u32 {
+    let entries = levels.saturating_sub(1) + if top_levels > 0 { top_levels + 1 } else { 0 };
+    let far = entries.saturating_sub(NEAR) as u32;
+    FARS.into_iter().find(|f| *f >= far).unwrap_or(FARS[FARS.len() - 1])
+}
+
+/// The kernel that traces a picture, with so many further entries of stacks.
+pub fn trace(far: u32) -> String {
+    with_far(&joined(TRACING, part!("trace.wgsl")), far)
+}
+
+fn with_far(text: &str, far: u32) -> String {
+    text.replace("const FAR: u32 = 44u;", &format!("const FAR: u32 = {far}u;"))
 }
 
 /// The kernel that makes auxiliary pictures of the rays through pixels' centres.
-pub fn center() -> String {
-    joined(TRACING, part!("center.wgsl"))
+pub fn center(far: u32) -> String {
+    with_far(&joined(TRACING, part!("center.wgsl")), far)
 }
 
 /// The kernel that fits trees.
