@@ -22,7 +22,7 @@ pub use report::{DeviceReport, Report, Totals};
 pub use source::Sources;
 
 use crate::clock::Stopwatch;
-use crate::device::{Device, Stop};
+use crate::device::{Device, DeviceKind, Stop};
 use crate::film::Film;
 use crate::job::Job;
 use crate::output::{self, OutputError, Records, RunLog};
@@ -36,10 +36,19 @@ use std::sync::atomic::AtomicUsize;
 use std::sync::mpsc::{channel, sync_channel};
 use std::sync::{Arc, Mutex};
 
-/// Frames read ahead of the device, those being read included.
-const FRAMES_READ_AHEAD: usize = 3;
-/// Most threads that read, and most that encode: two of each keep one device busy.
-const STAGE_THREADS_MAX: usize = 2;
+/// Frames read ahead of the device beyond those being read.
+const FRAMES_READ_AHEAD: usize = 1;
+/// Most threads that read, and most that encode, beside a device that uses the same cores.
+const STAGE_THREADS_BESIDE: usize = 2;
+
+/// Threads that read, and as many that encode: two of each keep a device busy that uses the same cores; another one is as fast
+/// as all of them together, half for each.
+fn stage_threads(threads: usize, kind: DeviceKind) -> usize {
+    match kind {
+        DeviceKind::Gpu => threads.div_ceil(2),
+        DeviceKind::Cpu | DeviceKind::Fake => threads.clamp(1, STAGE_THREADS_BESIDE),
+    }
+}
 
 /// What of the command line bears on the run itself.
 #[derive(Clone, Debug, Default)]
@@ -155,8 +164,9 @@ pub fn render(
     let reader = read::Reader::new(job, options, &records, prepared);
     let log = RunLog::create(&job.folder);
     let next = AtomicUsize::new(0);
-    let flight = InFlight::new(FRAMES_READ_AHEAD, options.memory_bytes.unwrap_or(u64::MAX));
-    let threads = options.threads.clamp(1, STAGE_THREADS_MAX);
+    let threads = stage_threads(options.threads, device.info().kind);
+    let flight =
+        InFlight::new((threads + FRAMES_READ_AHEAD).max(3), options.memory_bytes.unwrap_or(u64::MAX));
     let mut saved = report::Saver::new(options.report.clone());
 
     std::thread::scope(|scope| {
