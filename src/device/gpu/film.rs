@@ -1,5 +1,6 @@
 //! What a frame's kernels wrote, as a film.
 
+use super::records::{CENTER_WORDS, COUNTER_ROWS};
 use super::scene::film_words;
 use crate::device::{Output, RayCounts};
 use crate::film::Film;
@@ -8,10 +9,7 @@ use rayon::ThreadPool;
 use rayon::prelude::*;
 use std::ops::Range;
 
-/// Words of a pixel's auxiliary pictures of its centre.
-const CENTER_WORDS: u64 = 12;
-/// Rows of counts of rays, `COUNTER_ROWS` in shaders/parts/counts.wgsl, of words of which five are used.
-const COUNTER_ROWS: u64 = 256;
+/// Words of a row of counts of rays.
 const COUNTER_ROW: u64 = 8;
 pub(super) const COUNTERS: u64 = COUNTER_ROWS * COUNTER_ROW;
 /// Instants: when fits begin and end, and tracing.

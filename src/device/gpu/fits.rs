@@ -1,10 +1,7 @@
 //! Trees that are fitted together, and the dispatches that do it.
 
-use super::records::{RefitLevel, RefitTree};
+use super::records::{NODES_IN_GROUP, RefitLevel, RefitTree};
 use super::resident::{Fit, FitOf};
-
-/// Nodes that a workgroup fits.
-const NODES_IN_GROUP: u32 = 32;
 
 /// What is to be fitted before a frame is traced.
 #[derive(Debug)]

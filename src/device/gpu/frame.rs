@@ -7,7 +7,7 @@ use super::cuts::{Cut, GROUP, cuts, tile};
 use super::film::{COUNTERS, Facts, INSTANTS, Layout, take_out};
 use super::fits::{Fits, groups, is_top};
 use super::pipelines::{Kernel, Pipelines};
-use super::records::Slice;
+use super::records::{Slice, WAITING_ROWS};
 use super::resident::{FitOf, Heaps};
 use super::scene::Records;
 use crate::clock::Stopwatch;
@@ -23,8 +23,6 @@ pub(super) const SLOTS: usize = 3;
 const SAMPLES_MOST: u64 = 1 << 22;
 /// Of frames with rays that branch so many times fewer.
 const BRANCHING: u64 = 8;
-/// Rows of four words that a waiting ray takes, as `WAITING_ROWS` in shaders/parts/branch.wgsl.
-const WAITING_ROWS: u64 = 10;
 /// Bytes of waiting rays at most.
 const WAITING_BYTES: u64 = 1 << 29;
 

@@ -2,15 +2,13 @@
 
 use super::adapter::{GROUP_THREADS, Gpu};
 use super::scene::Has;
-use super::shaders;
+use super::shaders::{self, Access};
 use std::collections::HashMap;
 
-/// Bindings of kernels that trace: which are uniform, and which is bound at an offset given with each dispatch.
-const TRACE_BINDINGS: u32 = 16;
-const SHOT: u32 = 0;
-const SLICE: u32 = 1;
-/// The first binding that kernels write to.
-const FILM: u32 = 13;
+/// The binding of kernels that trace which is bound at an offset given with each dispatch.
+const SLICE: usize = 1;
+/// That of kernels that fit trees.
+const LEVEL: usize = 0;
 
 /// All that was made ready yet.
 #[derive(Debug)]
@@ -35,15 +33,8 @@ pub(super) enum Kernel {
 
 impl Pipelines {
     pub(super) fn new(gpu: &Gpu) -> Self {
-        let trace_layout = layout(gpu, "trace", TRACE_BINDINGS, |binding| match binding {
-            SHOT => (wgpu::BufferBindingType::Uniform, false),
-            SLICE => (wgpu::BufferBindingType::Uniform, true),
-            _ => (storage(binding < FILM), false),
-        });
-        let refit_layout = layout(gpu, "refit", 8, |binding| match binding {
-            0 => (wgpu::BufferBindingType::Uniform, true),
-            _ => (storage(binding < 3 || binding == 7), false),
-        });
+        let trace_layout = layout(gpu, "trace", &shaders::TRACE_BINDINGS, SLICE);
+        let refit_layout = layout(gpu, "refit", &shaders::REFIT_BINDINGS, LEVEL);
         let pipelines = |label: &str, layout: &wgpu::BindGroupLayout| {
             gpu.device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
                 label: Some(label),
@@ -85,40 +76,39 @@ impl Pipelines {
 
 fn constants(has: Has) -> [(&'static str, f64); 9] {
     let flags = [
-        ("SINGLE_TREE", has.single_tree),
-        ("HAS_BRANCHES", has.branches),
-        ("HAS_TEXTURES", has.textures),
-        ("HAS_AREA_LIGHT", has.area_light),
-        ("HAS_TRANSPARENCY", has.transparency),
-        ("GOES_ON", has.goes_on),
-        ("HAS_ALBEDO", has.albedo),
-        ("HAS_ONE_LIGHT", has.one_light),
-    ]
-    .map(|(name, is_set)| (name, f64::from(u8::from(is_set))));
-    let [a, b, c, d, e, f, g, h] = flags;
-    [a, b, c, d, e, f, g, h, ("FILM_WORDS", f64::from(has.film_words))]
+        has.single_tree,
+        has.branches,
+        has.textures,
+        has.area_light,
+        has.transparency,
+        has.goes_on,
+        has.albedo,
+        has.one_light,
+    ];
+    let mut constants = [(shaders::FILM_WORDS, f64::from(has.film_words)); 9];
+    for ((constant, name), is_set) in constants.iter_mut().zip(shaders::FLAGS).zip(flags) {
+        *constant = (name, f64::from(u8::from(is_set)));
+    }
+    constants
 }
 
-fn storage(read_only: bool) -> wgpu::BufferBindingType {
-    wgpu::BufferBindingType::Storage { read_only }
-}
-
-fn layout(
-    gpu: &Gpu,
-    label: &str,
-    bindings: u32,
-    kind: impl Fn(u32) -> (wgpu::BufferBindingType, bool),
-) -> wgpu::BindGroupLayout {
-    let entry = |binding: u32| {
-        let (ty, has_dynamic_offset) = kind(binding);
+/// The layout of a kernel's bindings, of which one is bound at an offset given with each dispatch.
+fn layout(gpu: &Gpu, label: &str, bindings: &[Access], with_offset: usize) -> wgpu::BindGroupLayout {
+    let entry = |(binding, access): (usize, &Access)| {
+        let ty = match access {
+            Access::Uniform => wgpu::BufferBindingType::Uniform,
+            Access::Read => wgpu::BufferBindingType::Storage { read_only: true },
+            Access::Write => wgpu::BufferBindingType::Storage { read_only: false },
+        };
+        let has_dynamic_offset = binding == with_offset;
         wgpu::BindGroupLayoutEntry {
-            binding,
+            binding: binding as u32,
             visibility: wgpu::ShaderStages::COMPUTE,
             ty: wgpu::BindingType::Buffer { ty, has_dynamic_offset, min_binding_size: None },
             count: None,
         }
     };
-    let entries: Vec<_> = (0..bindings).map(entry).collect();
+    let entries: Vec<_> = bindings.iter().enumerate().map(entry).collect();
     gpu.device
         .create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label: Some(label), entries: &entries })
 }

@@ -7,6 +7,15 @@ use bytemuck::{Pod, Zeroable};
 /// An index that is not there.
 pub const ABSENT: u32 = u32::MAX;
 
+/// Words of a pixel's auxiliary pictures of its centre.
+pub const CENTER_WORDS: u64 = 12;
+/// Rows of counts of rays, of words of which five are used.
+pub const COUNTER_ROWS: u64 = 256;
+/// Rows of four words that a waiting ray takes.
+pub const WAITING_ROWS: u64 = 10;
+/// Nodes that a workgroup fits.
+pub const NODES_IN_GROUP: u32 = 32;
+
 /// Everything but the geometry that bears on a frame's film.
 #[allow(missing_docs, reason = "said in shaders/parts/scene.wgsl")]
 #[repr(C)]

@@ -6,6 +6,39 @@ macro_rules! part {
     };
 }
 
+/// How a kernel has a buffer.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Access {
+    /// One record.
+    Uniform,
+    /// A list that is only read.
+    Read,
+    /// A list that is written to.
+    Write,
+}
+
+use Access::{Read, Uniform, Write};
+
+/// The bindings of kernels that trace, from 0 on: all of group 0.
+pub const TRACE_BINDINGS: [Access; 16] =
+    [Uniform, Uniform, Read, Read, Read, Read, Read, Read, Read, Read, Read, Read, Read, Write, Write, Write];
+/// The bindings of kernels that fit trees, from 0 on: all of group 0.
+pub const REFIT_BINDINGS: [Access; 8] = [Uniform, Read, Read, Write, Write, Write, Write, Read];
+
+/// The constants of kernels that trace which say whether a frame has something.
+pub const FLAGS: [&str; 8] = [
+    "SINGLE_TREE",
+    "HAS_BRANCHES",
+    "HAS_TEXTURES",
+    "HAS_AREA_LIGHT",
+    "HAS_TRANSPARENCY",
+    "GOES_ON",
+    "HAS_ALBEDO",
+    "HAS_ONE_LIGHT",
+];
+/// The constant of kernels that trace which says how many words a pixel has: 1, 3 or 4.
+pub const FILM_WORDS: &str = "FILM_WORDS";
+
 /// What kernels that trace have in common.
 const TRACING: &[&str] = &[
     part!("parts/exact.wgsl"),
