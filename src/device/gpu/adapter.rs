@@ -235,6 +235,8 @@ pub(super) struct Gpu {
 impl Gpu {
     /// An error where the device is lost or refused something.
     pub(super) fn check(&self) -> Result<(), DeviceError> {
+        // callbacks are called from here; how this went they say
+        let _ = self.device.poll(wgpu::PollType::Poll);
         match &*self.trouble.lock().unwrap_or_else(PoisonError::into_inner) {
             None => Ok(()),
             Some(why) => Err(DeviceError::Lost { device: self.name.clone(), why: why.clone() }),
