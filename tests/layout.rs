@@ -295,11 +295,8 @@ fn constants_are_the_same_on_both_sides() {
         ("SURFACES_MAX", kernel::SURFACES_MAX.into()),
         ("MEDIA_MAX", media::MEDIA_MAX as u64),
     ];
-    let refit = [("NODES_IN_GROUP", u64::from(records::NODES_IN_GROUP))];
     let center = [("CENTER_WORDS", records::CENTER_WORDS), ("SURFACES_MAX", kernel::SURFACES_MAX.into())];
-    for (text, constants) in
-        [(shaders::trace(), &trace[..]), (shaders::refit(), &refit[..]), (shaders::center(), &center[..])]
-    {
+    for (text, constants) in [(shaders::trace(), &trace[..]), (shaders::center(), &center[..])] {
         let module = parsed(&text);
         for (name, here) in constants {
             assert_eq!(constant(&module, name), Some(*here), "{name}");

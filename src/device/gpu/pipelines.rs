@@ -46,7 +46,7 @@ impl Pipelines {
         let refit_pipelines = pipelines("refit", &refit_layout);
         let refit = module(gpu, "refit", &shaders::refit());
         let fit = |entry: &str, threads: u32| {
-            pipeline(gpu, &refit_pipelines, &refit, entry, &[("GROUP", f64::from(threads))])
+            pipeline(gpu, &refit_pipelines, &refit, entry, &[(shaders::GROUP, f64::from(threads))])
         };
         Self {
             refit_level: fit("refit_level", GROUP_THREADS),

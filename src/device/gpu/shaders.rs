@@ -38,6 +38,8 @@ pub const FLAGS: [&str; 8] = [
 ];
 /// The constant of kernels that trace which says how many words a pixel has: 1, 3 or 4.
 pub const FILM_WORDS: &str = "FILM_WORDS";
+/// The constant of kernels that fit trees which says how many threads a workgroup has: eight for each node.
+pub const GROUP: &str = "GROUP";
 
 /// What kernels that trace have in common.
 const TRACING: &[&str] = &[
