@@ -4,6 +4,7 @@
 use bytemuck::Zeroable;
 use naga::{Expression, Literal, Module, TypeInner};
 use rentix::accel::PackedNode;
+use rentix::device::gpu::shaders::FARS;
 use rentix::device::gpu::{records, shaders};
 use rentix::kernel::{self, camera, light, material, media};
 use rentix::scene::Filter;
@@ -185,8 +186,8 @@ fn differences(text: &str, records: &[Layout]) -> Vec<String> {
 #[test]
 fn records_are_laid_out_alike() {
     for (text, records) in [
-        (shaders::trace(), records_of_trace()),
-        (shaders::center(), records_of_trace()),
+        (shaders::trace(FARS[FARS.len() - 1]), records_of_trace()),
+        (shaders::center(FARS[FARS.len() - 1]), records_of_trace()),
         (shaders::refit(), records_of_refit()),
     ] {
         let differences = differences(&text, &records);
@@ -202,7 +203,9 @@ fn records_are_laid_out_alike() {
 /// Every structure that a binding holds has its twin here.
 #[test]
 fn no_record_is_without_its_twin() {
-    for (text, records) in [(shaders::trace(), records_of_trace()), (shaders::refit(), records_of_refit())] {
+    for (text, records) in
+        [(shaders::trace(FARS[FARS.len() - 1]), records_of_trace()), (shaders::refit(), records_of_refit())]
+    {
         let module = parsed(&text);
         for (_, variable) in module.global_variables.iter().filter(|(_, v)| v.binding.is_some()) {
             let mut held = &module.types[variable.ty];
@@ -220,7 +223,7 @@ fn no_record_is_without_its_twin() {
 /// Fields that change places, kinds or numbers are found, also where the text stays valid.
 #[test]
 fn what_differs_is_found() {
-    let text = shaders::trace();
+    let text = shaders::trace(FARS[FARS.len() - 1]);
     let bites = |changes: &[(&str, &str)], name: &str| {
         let mut changed = text.clone();
         for (from, to) in changes {
@@ -296,7 +299,10 @@ fn constants_are_the_same_on_both_sides() {
         ("MEDIA_MAX", media::MEDIA_MAX as u64),
     ];
     let center = [("CENTER_WORDS", records::CENTER_WORDS), ("SURFACES_MAX", kernel::SURFACES_MAX.into())];
-    for (text, constants) in [(shaders::trace(), &trace[..]), (shaders::center(), &center[..])] {
+    for (text, constants) in [
+        (shaders::trace(FARS[FARS.len() - 1]), &trace[..]),
+        (shaders::center(FARS[FARS.len() - 1]), &center[..]),
+    ] {
         let module = parsed(&text);
         for (name, here) in constants {
             assert_eq!(constant(&module, name), Some(*here), "{name}");
@@ -307,7 +313,7 @@ fn constants_are_the_same_on_both_sides() {
 /// The places of maps in a material's words are those of `Textures::slots`.
 #[test]
 fn maps_stand_in_the_order_of_slots() {
-    let module = parsed(&shaders::trace());
+    let module = parsed(&shaders::trace(FARS[FARS.len() - 1]));
     let names = ["MAP_KA", "MAP_KD", "MAP_KS", "MAP_KE", "MAP_NS", "MAP_D", "MAP_BUMP", "MAP_NORM"];
     let map = |value: u8| {
         let texture = rentix::scene::Texture {

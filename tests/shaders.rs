@@ -3,16 +3,21 @@
 use naga::back::PipelineConstants;
 use naga::back::pipeline_constants::process_overrides;
 use naga::valid::{Capabilities, ModuleInfo, ValidationFlags, Validator};
-use naga::{AddressSpace, Module, ShaderStage, StorageAccess};
+use naga::{AddressSpace, Expression, Literal, Module, ShaderStage, StorageAccess};
 use rayon::prelude::*;
 use rentix::device::gpu::records::NODES_IN_GROUP;
-use rentix::device::gpu::shaders::{self, Access, FILM_WORDS, FLAGS, GROUP, REFIT_BINDINGS, TRACE_BINDINGS};
+use rentix::device::gpu::shaders::{
+    self, Access, FARS, FILM_WORDS, FLAGS, GROUP, REFIT_BINDINGS, TRACE_BINDINGS,
+};
 use std::collections::BTreeSet;
 use std::path::Path;
 
+/// The largest of the stacks for which there are kernels: as it stands in the text.
+const MOST_FAR: u32 = FARS[FARS.len() - 1];
+
 /// Each kernel's text, by the name of its file.
 fn kernels() -> [(&'static str, String); 3] {
-    [("trace", shaders::trace()), ("center", shaders::center()), ("refit", shaders::refit())]
+    [("trace", shaders::trace(MOST_FAR)), ("center", shaders::center(MOST_FAR)), ("refit", shaders::refit())]
 }
 
 /// A text as naga reads it; it needs nothing that not every adapter has.
@@ -36,6 +41,23 @@ fn kernels_are_valid_as_they_stand() {
         };
         let wanted: Vec<_> = wanted.into_iter().map(|entry| (ShaderStage::Compute, entry)).collect();
         assert_eq!(entries, wanted, "{name}");
+    }
+}
+
+#[test]
+fn kernels_have_the_stacks_that_they_are_made_for() {
+    for far in FARS {
+        for (name, text) in [("trace", shaders::trace(far)), ("center", shaders::center(far))] {
+            let (module, _) = valid(name, &text);
+            let (_, constant) = module
+                .constants
+                .iter()
+                .find(|(_, c)| c.name.as_deref() == Some("FAR"))
+                .unwrap_or_else(|| panic!("{name}: FAR is not there"));
+            let value = &module.global_expressions[constant.init];
+            let is_set = matches!(value, Expression::Literal(Literal::U32(value)) if *value == far);
+            assert!(is_set, "{name}: {value:?}, not {far}");
+        }
     }
 }
 
