@@ -32,6 +32,7 @@ const LARGE_SPHERE: [u32; 2] = [1024, 512];
 const SHOTS: [([u32; 2], u32); 4] =
     [([1280, 720], 1), ([1920, 1080], 1), ([1280, 720], 16), ([1920, 1080], 16)];
 
+#[allow(clippy::needless_pass_by_value, reason = "it stands where errors are mapped")]
 fn failed(error: DeviceError) -> BenchError {
     BenchError::Frame(error.to_string())
 }

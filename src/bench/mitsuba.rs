@@ -9,7 +9,7 @@ use std::process::{Command, Stdio};
 pub struct Mitsuba {
     /// Where the script is.
     pub script: PathBuf,
-    /// cuda_ad_rgb, llvm_ad_rgb or scalar_rgb.
+    /// `cuda_ad_rgb`, `llvm_ad_rgb` or `scalar_rgb`.
     pub variant: String,
 }
 

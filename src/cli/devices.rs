@@ -6,6 +6,7 @@ use crate::device::cpu::CpuDevice;
 use crate::device::gpu::{Adapter, adapters};
 use crate::run::machine;
 use anyhow::Result;
+use std::fmt::Write as _;
 use std::process::ExitCode;
 
 /// Lists what can render.
@@ -57,9 +58,9 @@ fn for_people(adapter: &Adapter) -> String {
         return format!("{text}\n       cannot be used: {lacks}");
     }
     if let Some(bytes) = adapter.memory_bytes() {
-        text.push_str(&format!(", {} of memory", gibibytes(bytes)));
+        let _ = write!(text, ", {} of memory", gibibytes(bytes));
     }
-    text.push_str(&format!(", may hold {}", gibibytes(budget_bytes(adapter))));
+    let _ = write!(text, ", may hold {}", gibibytes(budget_bytes(adapter)));
     if adapter.is_software() {
         text.push_str(" (used only where it is named)");
     }

@@ -69,13 +69,11 @@ impl Film {
 
     /// RGB of 8 bits on the sRGB curve, RGBA with straight colour where there is alpha and it is wanted.
     pub fn codes(&self, with_alpha: bool, exposure_stops: f32) -> Cow<'_, [u8]> {
-        match &self.codes {
-            Some(codes) => Cow::Borrowed(codes),
-            None => {
-                let alpha = self.alpha.as_deref().filter(|_| with_alpha);
-                Cow::Owned(quantize::quantize8(&self.rgb, alpha, exposure_stops))
-            }
+        if let Some(codes) = &self.codes {
+            return Cow::Borrowed(codes);
         }
+        let alpha = self.alpha.as_deref().filter(|_| with_alpha);
+        Cow::Owned(quantize::quantize8(&self.rgb, alpha, exposure_stops))
     }
 
     /// A black film with room for what is asked.

@@ -142,8 +142,8 @@ impl Failure {
 impl DeviceStage<'_> {
     /// Begins a frame; before that finishes others, where the device takes no more.
     fn take(&mut self, mut read: ReadFrame, bytes: u64) {
-        let is_copy = |before: &&Before| before.fingerprint == read.fingerprint;
-        if self.before.as_ref().filter(|_| !self.cold).filter(is_copy).is_some() {
+        let is_copy = |before: &Before| before.fingerprint == read.fingerprint;
+        if !self.cold && self.before.as_ref().is_some_and(is_copy) {
             while !self.under_way.is_empty() {
                 self.finish_first();
             }

@@ -20,7 +20,7 @@ const UNKNOWN_MEMORY_BYTES: u64 = 1 << 30;
 pub struct Adapter {
     /// Its place among the adapters: `gpu:N`.
     pub number: usize,
-    adapter: wgpu::Adapter,
+    handle: wgpu::Adapter,
     info: wgpu::AdapterInfo,
     memory_bytes: Option<u64>,
     /// Features that are there but not used.
@@ -41,7 +41,7 @@ pub fn adapters() -> Vec<Adapter> {
         number,
         info: adapter.get_info(),
         memory_bytes: memory_bytes(&adapter),
-        adapter,
+        handle: adapter,
         unused: wgpu::Features::empty(),
     };
     found.into_iter().enumerate().map(adapter).collect()
@@ -63,6 +63,9 @@ fn rank(kind: wgpu::DeviceType) -> u32 {
     }
 }
 
+/// Vulkan's flag of a heap that is the device's own.
+const DEVICE_LOCAL: u32 = 1;
+
 /// Bytes of an adapter's own memory, where its back end tells.
 fn memory_bytes(adapter: &wgpu::Adapter) -> Option<u64> {
     // SAFETY: the handle is only asked about, while the adapter lives.
@@ -70,7 +73,6 @@ fn memory_bytes(adapter: &wgpu::Adapter) -> Option<u64> {
     let instance = vulkan.shared_instance().raw_instance();
     // SAFETY: the physical device is the instance's, which lives as long as the adapter.
     let memory = unsafe { instance.get_physical_device_memory_properties(vulkan.raw_physical_device()) };
-    const DEVICE_LOCAL: u32 = 1;
     let heaps = memory.memory_heaps.iter().take(memory.memory_heap_count as usize);
     heaps.filter(|heap| heap.flags.as_raw() & DEVICE_LOCAL != 0).map(|heap| heap.size).max()
 }
@@ -105,7 +107,7 @@ impl Adapter {
 
     /// Bytes that a buffer of it may have in a kernel.
     pub fn binding_bytes(&self) -> u64 {
-        let limits = self.adapter.limits();
+        let limits = self.handle.limits();
         limits.max_storage_buffer_binding_size.min(limits.max_buffer_size)
     }
 
@@ -130,7 +132,7 @@ impl Adapter {
             | wgpu::Features::TIMESTAMP_QUERY_INSIDE_ENCODERS
             | wgpu::Features::MAPPABLE_PRIMARY_BUFFERS
             | wgpu::Features::PIPELINE_CACHE;
-        self.adapter.features() & wanted & !self.unused
+        self.handle.features() & wanted & !self.unused
     }
 
     /// The same as if it had nothing beyond what every adapter has, for tests.
@@ -142,7 +144,7 @@ impl Adapter {
 
     /// Why it cannot be used, where it cannot.
     pub fn lacks(&self) -> Option<String> {
-        let limits = self.adapter.limits();
+        let limits = self.handle.limits();
         let least = [
             (
                 "storage buffers in a kernel",
@@ -170,7 +172,7 @@ impl Adapter {
     }
 
     fn top_threads(&self) -> u32 {
-        let limits = self.adapter.limits();
+        let limits = self.handle.limits();
         let bytes = GROUP_BYTES / GROUP_THREADS * TOP_THREADS;
         let fits = limits.max_compute_invocations_per_workgroup >= TOP_THREADS
             && limits.max_compute_workgroup_size_x >= TOP_THREADS
@@ -184,10 +186,10 @@ impl Adapter {
         if let Some(lacks) = self.lacks() {
             return Err(lost(lacks));
         }
-        let request = self.adapter.request_device(&wgpu::DeviceDescriptor {
+        let request = self.handle.request_device(&wgpu::DeviceDescriptor {
             label: Some("rentix"),
             required_features: self.used_features(),
-            required_limits: self.adapter.limits(),
+            required_limits: self.handle.limits(),
             memory_hints: wgpu::MemoryHints::Performance,
             ..wgpu::DeviceDescriptor::default()
         });
@@ -200,7 +202,7 @@ impl Adapter {
         Ok(Gpu {
             name: self.name(),
             binding_bytes: self.binding_bytes(),
-            groups_most: self.adapter.limits().max_compute_workgroups_per_dimension,
+            groups_most: self.handle.limits().max_compute_workgroups_per_dimension,
             features: self.used_features(),
             top_threads: self.top_threads(),
             device,

@@ -119,14 +119,15 @@ impl Ground<'_> {
         self.room_for_fits(fits)?;
         let slot = self.room_for_frame(&layout, waiting_bytes)?;
         let sections = self.write_frame(records, fits, &slices, &center_slices, lanes, waiting_each)?;
-        let (film, back) = (held(&self.buffers.slots[slot].film), self.buffers.slots[slot].back.clone());
+        let (film, back) =
+            (held(self.buffers.slots[slot].film.as_ref()), self.buffers.slots[slot].back.clone());
         let film = film.clone();
 
         let mut encoder = self.encoder();
         let instants = self.buffers.instants.clone();
         let set = instants.as_ref().map(|(set, _)| set);
         self.fit(&mut encoder, fits, &sections.refit_trees, &sections.refit_levels, set);
-        encoder.clear_buffer(held(&self.buffers.counters), 0, None);
+        encoder.clear_buffer(held(self.buffers.counters.as_ref()), 0, None);
         for (kernel, cuts, slices, range) in [
             (Kernel::Trace, &slices, &sections.slices, &layout.film),
             (Kernel::Center, &center_slices, &sections.center_slices, &layout.center),
@@ -142,7 +143,7 @@ impl Ground<'_> {
                     return Err(DeviceError::Stopped);
                 }
                 let timed = set.filter(|_| kernel == Kernel::Trace);
-                self.dispatch(&mut encoder, &pipeline, &group, i, cut, timed, [i == 0, i + 1 == cuts.len()]);
+                Self::dispatch(&mut encoder, &pipeline, &group, i, cut, timed, [i == 0, i + 1 == cuts.len()]);
                 if i + 1 < cuts.len() {
                     let next = self.encoder();
                     self.gpu.queue.submit([std::mem::replace(&mut encoder, next).finish()]);
@@ -151,7 +152,7 @@ impl Ground<'_> {
                 }
             }
         }
-        let counters = held(&self.buffers.counters);
+        let counters = held(self.buffers.counters.as_ref());
         encoder.copy_buffer_to_buffer(counters, 0, &film, layout.counters.start, 4 * COUNTERS);
         if let Some((set, resolved)) = &instants {
             encoder.resolve_query_set(set, 0..INSTANTS as u32, resolved, 0);
@@ -159,7 +160,13 @@ impl Ground<'_> {
         }
         if !fits.is_empty() {
             let bytes = 4 * fits.trees.len() as u64;
-            encoder.copy_buffer_to_buffer(held(&self.buffers.costs), 0, &film, layout.costs.start, bytes);
+            encoder.copy_buffer_to_buffer(
+                held(self.buffers.costs.as_ref()),
+                0,
+                &film,
+                layout.costs.start,
+                bytes,
+            );
         }
         if let Some(back) = &back {
             encoder.copy_buffer_to_buffer(&film, 0, back, 0, layout.bytes());
@@ -181,7 +188,7 @@ impl Ground<'_> {
         self.gpu.wait_for(begun.submission.clone())?;
         let clock = Stopwatch::start();
         let slot = &self.buffers.slots[begun.slot];
-        let buffer = slot.back.as_ref().unwrap_or_else(|| held(&slot.film));
+        let buffer = slot.back.as_ref().unwrap_or_else(|| held(slot.film.as_ref()));
         let (film, facts) = {
             let lost = |e: wgpu::MapRangeError| DeviceError::Lost {
                 device: self.gpu.name.clone(),
@@ -197,7 +204,6 @@ impl Ground<'_> {
 
     #[allow(clippy::too_many_arguments, reason = "what a dispatch is")]
     fn dispatch(
-        &self,
         encoder: &mut wgpu::CommandEncoder,
         pipeline: &wgpu::ComputePipeline,
         group: &wgpu::BindGroup,
@@ -328,7 +334,7 @@ impl Ground<'_> {
 
     /// A section of the arena as a binding.
     fn section(&self, section: &Section) -> wgpu::BindingResource<'_> {
-        binding(held(&self.buffers.frame), section)
+        binding(held(self.buffers.frame.as_ref()), section)
     }
 
     fn bindings(
@@ -344,7 +350,7 @@ impl Ground<'_> {
         let Heaps { nodes, triangles, words, texels } = self.heaps;
         resources.extend([nodes, triangles, words, texels].map(|heap| heap.buffer().as_entire_binding()));
         resources.push(binding(film, range));
-        resources.extend([waiting, counters].map(|buffer| held(buffer).as_entire_binding()));
+        resources.extend([waiting, counters].map(|buffer| held(buffer.as_ref()).as_entire_binding()));
         bind_group(self.gpu, &self.pipelines.trace_layout, resources)
     }
 
@@ -367,8 +373,8 @@ impl Ground<'_> {
             words.buffer().as_entire_binding(),
             nodes.buffer().as_entire_binding(),
             triangles.buffer().as_entire_binding(),
-            held(&self.buffers.boxes).as_entire_binding(),
-            held(&self.buffers.costs).as_entire_binding(),
+            held(self.buffers.boxes.as_ref()).as_entire_binding(),
+            held(self.buffers.costs.as_ref()).as_entire_binding(),
             words.buffer().as_entire_binding(),
         ];
         let group = bind_group(self.gpu, &self.pipelines.refit_layout, resources);
@@ -416,9 +422,9 @@ fn room(
 }
 
 /// A buffer for which there is room.
-fn held(buffer: &Option<wgpu::Buffer>) -> &wgpu::Buffer {
+fn held(buffer: Option<&wgpu::Buffer>) -> &wgpu::Buffer {
     // whoever asks has made room before
-    buffer.as_ref().expect("room was made")
+    buffer.expect("room was made")
 }
 
 fn binding<'a>(buffer: &'a wgpu::Buffer, section: &Range<u64>) -> wgpu::BindingResource<'a> {

@@ -15,7 +15,7 @@ const LEVEL: usize = 0;
 pub(super) struct Pipelines {
     pub(super) trace_layout: wgpu::BindGroupLayout,
     pub(super) refit_layout: wgpu::BindGroupLayout,
-    trace_pipelines: wgpu::PipelineLayout,
+    tracing_layout: wgpu::PipelineLayout,
     modules: HashMap<(Kernel, u32), wgpu::ShaderModule>,
     pub(super) refit_level: wgpu::ComputePipeline,
     pub(super) refit_top: wgpu::ComputePipeline,
@@ -42,7 +42,7 @@ impl Pipelines {
                 immediate_size: 0,
             })
         };
-        let trace_pipelines = pipelines("trace", &trace_layout);
+        let tracing_layout = pipelines("trace", &trace_layout);
         let refit_pipelines = pipelines("refit", &refit_layout);
         let refit = module(gpu, "refit", &shaders::refit());
         let fit = |entry: &str, threads: u32| {
@@ -54,14 +54,14 @@ impl Pipelines {
             modules: HashMap::new(),
             trace_layout,
             refit_layout,
-            trace_pipelines,
+            tracing_layout,
             made: HashMap::new(),
         }
     }
 
     /// The pipeline for frames that have this.
     pub(super) fn tracing(&mut self, gpu: &Gpu, kernel: Kernel, has: Has) -> &wgpu::ComputePipeline {
-        let Self { trace_pipelines, modules, made, .. } = self;
+        let Self { tracing_layout, modules, made, .. } = self;
         made.entry((kernel, has)).or_insert_with(|| {
             let (entry, text): (_, fn(u32) -> String) = match kernel {
                 Kernel::Trace => ("trace", shaders::trace),
@@ -69,7 +69,7 @@ impl Pipelines {
             };
             let module =
                 modules.entry((kernel, has.far)).or_insert_with(|| module(gpu, entry, &text(has.far)));
-            pipeline(gpu, trace_pipelines, module, entry, &constants(has))
+            pipeline(gpu, tracing_layout, module, entry, &constants(has))
         })
     }
 }

@@ -8,10 +8,10 @@ use crate::clock::Stopwatch;
 use crate::device::{DeviceError, DeviceInfo, UpdateCost};
 use crate::math::LINEAR_FROM_SRGB8;
 use crate::plan::{Residency, Step, TreeState, UpdatePlan, tree_name};
-use crate::scene::{Frame, Geometry, PartHash, Texels, Texture, Triangles};
+use crate::scene::{Frame, Geometry, Part, PartHash, Texels, Texture, Triangles};
 use rayon::ThreadPool;
 use rayon::prelude::*;
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 use std::ops::Range;
 
 /// Nodes that one workgroup fits height after height, at most.
@@ -268,7 +268,7 @@ impl Resident {
             return Err(means.out_of_memory(needed_bytes, means.info.budget_bytes));
         }
         let cost = packed.cost;
-        let tree = self.place(packed, triangles.hash(), &vertices_of(triangles), means)?;
+        let tree = self.place(packed, triangles, means)?;
         self.residency.hold_tree(name, bytes, TreeState::built(geometry, cost));
         self.trees.insert(name, tree);
         self.fit(name, geometry, true);
@@ -279,8 +279,7 @@ impl Resident {
     fn place(
         &mut self,
         packed: PackedTree,
-        corners: PartHash,
-        vertices: &dyn Fn(&[u32], &ThreadPool) -> Vec<[u32; 4]>,
+        triangles: &Part<Triangles>,
         means: &Means,
     ) -> Result<GpuTree, DeviceError> {
         let PackedTree { mut nodes, order, by_height, heights, .. } = packed;
@@ -295,7 +294,7 @@ impl Resident {
         move_nodes(&mut nodes, root, place_triangles.start);
         let gpu = means.gpu;
         self.heaps.nodes.write(gpu, root, bytemuck::cast_slice(&nodes));
-        let vertices = vertices(&order, means.pool);
+        let vertices = vertices(&order, triangles, means.pool);
         self.heaps.words.write(gpu, place_vertices.start, bytemuck::cast_slice(&vertices));
         self.heaps.words.write(gpu, place_lists.start, bytemuck::cast_slice(&lists));
         self.next_mark += 1;
@@ -307,7 +306,7 @@ impl Resident {
             lists: place_lists,
             heights,
             order,
-            corners,
+            corners: triangles.hash(),
         })
     }
 
@@ -387,10 +386,6 @@ impl Resident {
     }
 }
 
-fn vertices_of(triangles: &Triangles) -> impl Fn(&[u32], &ThreadPool) -> Vec<[u32; 4]> {
-    move |order, pool| vertices(order, triangles, pool)
-}
-
 /// For each place of a leaf the vertices of its triangle, and its number.
 fn vertices(order: &[u32], triangles: &Triangles, pool: &ThreadPool) -> Vec<[u32; 4]> {
     let of = |&number: &u32| {
@@ -449,12 +444,12 @@ pub(super) fn texels(texture: &Texture) -> &[u8] {
 
 /// Refuses a frame of which one kind of data does not fit the largest buffer that the adapter allows.
 fn refuse_beyond_bindings(frame: &Frame, means: &Means) -> Result<(), DeviceError> {
-    let mut seen = HashMap::new();
+    let mut seen = HashSet::new();
     let (mut triangles, mut words_bytes, mut texels_bytes) = (0_u64, 0_u64, 0_u64);
     for object in &frame.objects {
         let geometry = &*object.geometry;
         for (name, bytes) in geometry.parts() {
-            if seen.insert(name, ()).is_none() {
+            if seen.insert(name) {
                 if words(name, geometry).is_some() {
                     words_bytes += bytes;
                 } else if geometry.textures().any(|t| t.hash() == name) {
@@ -462,7 +457,7 @@ fn refuse_beyond_bindings(frame: &Frame, means: &Means) -> Result<(), DeviceErro
                 }
             }
         }
-        if seen.insert(tree_name(geometry), ()).is_none() {
+        if seen.insert(tree_name(geometry)) {
             triangles += geometry.triangles.0.len() as u64;
         }
     }
