@@ -24,6 +24,7 @@ const HOUSE: House = House {
         "src/accel/traced.rs",
         "src/accel/stack.rs",
         "src/device/gpu/adapter.rs",
+        "src/device/gpu/cache.rs",
         "src/device/gpu/pipelines.rs",
         "src/format/decimals.rs",
         "src/format/obj/lines.rs",

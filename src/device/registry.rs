@@ -16,7 +16,7 @@ pub struct Wanted {
     pub budget_bytes: Option<u64>,
     /// That of devices in the host's memory, where nothing else is said.
     pub host_budget_bytes: u64,
-    /// Where shapes of trees are kept from run to run.
+    /// Where shapes of trees and compiled kernels are kept from run to run.
     pub store: Option<Arc<Store>>,
 }
 
@@ -83,5 +83,6 @@ fn gpu(adapter: &Adapter, wanted: &Wanted) -> Result<Box<dyn Device>, RegistryEr
         return Err(RegistryError::Lacks(lacks));
     }
     let own = if adapter.is_software() { wanted.host_budget_bytes } else { adapter.default_budget_bytes() };
-    Ok(Box::new(GpuDevice::new(adapter, wanted.threads, wanted.budget_bytes.unwrap_or(own))?))
+    let budget_bytes = wanted.budget_bytes.unwrap_or(own);
+    Ok(Box::new(GpuDevice::with_store(adapter, wanted.threads, budget_bytes, wanted.store.clone())?))
 }

@@ -2,6 +2,7 @@
 
 mod adapter;
 mod arena;
+mod cache;
 mod cuts;
 mod film;
 mod fits;
@@ -20,6 +21,7 @@ use crate::accel::{Aabb, PackedNode};
 use crate::clock::Stopwatch;
 use crate::plan::{Residency, UpdatePlan};
 use crate::scene::{Background, Frame, Geometry, PartHash, Shot, Texture};
+use crate::store::Store;
 use adapter::Gpu;
 use fits::Fits;
 use frame::{Begun, Buffers, Ground, SLOTS};
@@ -29,12 +31,15 @@ use resident::{Means, Resident};
 use scene::Records;
 use std::collections::{HashMap, VecDeque};
 use std::ops::Range;
+use std::sync::Arc;
 
 /// A GPU that renders.
 #[derive(Debug)]
 pub struct GpuDevice {
     info: DeviceInfo,
     adapter: Adapter,
+    /// Has compiled kernels.
+    store: Option<Arc<Store>>,
     /// Builds trees.
     pool: ThreadPool,
     /// None once it was lost, until it is opened again.
@@ -63,6 +68,19 @@ impl GpuDevice {
     /// # Errors
     /// [`DeviceError::Lost`] where the adapter lacks something, cannot be opened, or there are no threads.
     pub fn new(adapter: &Adapter, threads: usize, budget_bytes: u64) -> Result<Self, DeviceError> {
+        Self::with_store(adapter, threads, budget_bytes, None)
+    }
+
+    /// The same, with compiled kernels kept in a store.
+    ///
+    /// # Errors
+    /// As [`Self::new`].
+    pub fn with_store(
+        adapter: &Adapter,
+        threads: usize,
+        budget_bytes: u64,
+        store: Option<Arc<Store>>,
+    ) -> Result<Self, DeviceError> {
         let no_threads =
             |e: rayon::ThreadPoolBuildError| DeviceError::Lost { device: adapter.name(), why: e.to_string() };
         let pool = ThreadPoolBuilder::new()
@@ -78,7 +96,7 @@ impl GpuDevice {
             budget_bytes,
         };
         let mut device =
-            Self { info, adapter: adapter.clone(), pool, open: None, nothing: Residency::default() };
+            Self { info, adapter: adapter.clone(), store, pool, open: None, nothing: Residency::default() };
         device.opened()?;
         Ok(device)
     }
@@ -93,7 +111,7 @@ impl GpuDevice {
     fn opened(&mut self) -> Result<&mut Open, DeviceError> {
         if self.open.is_none() {
             let gpu = self.adapter.open()?;
-            let pipelines = Pipelines::new(&gpu);
+            let pipelines = Pipelines::new(&gpu, self.store.as_ref());
             let full = |full: heap::Full| DeviceError::OutOfMemory {
                 device: self.info.name.clone(),
                 needed_bytes: full.needed_bytes,

@@ -1,9 +1,12 @@
 //! Kernels made ready: layouts of bindings, and a pipeline for each set of what frames have.
 
 use super::adapter::{GROUP_THREADS, Gpu};
+use super::cache::Compiled;
 use super::scene::Has;
 use super::shaders::{self, Access};
+use crate::store::Store;
 use std::collections::HashMap;
+use std::sync::Arc;
 
 /// The binding of kernels that trace which is bound at an offset given with each dispatch.
 const SLICE: usize = 1;
@@ -20,6 +23,7 @@ pub(super) struct Pipelines {
     pub(super) refit_level: wgpu::ComputePipeline,
     pub(super) refit_top: wgpu::ComputePipeline,
     made: HashMap<(Kernel, Has), wgpu::ComputePipeline>,
+    compiled: Option<Compiled>,
 }
 
 /// A kernel that traces.
@@ -32,7 +36,9 @@ pub(super) enum Kernel {
 }
 
 impl Pipelines {
-    pub(super) fn new(gpu: &Gpu) -> Self {
+    pub(super) fn new(gpu: &Gpu, store: Option<&Arc<Store>>) -> Self {
+        let compiled = Compiled::new(gpu, store);
+        let cache = compiled.as_ref().map(Compiled::cache);
         let trace_layout = layout(gpu, "trace", &shaders::TRACE_BINDINGS, SLICE);
         let refit_layout = layout(gpu, "refit", &shaders::REFIT_BINDINGS, LEVEL);
         let pipelines = |label: &str, layout: &wgpu::BindGroupLayout| {
@@ -46,7 +52,7 @@ impl Pipelines {
         let refit_pipelines = pipelines("refit", &refit_layout);
         let refit = module(gpu, "refit", &shaders::refit());
         let fit = |entry: &str, threads: u32| {
-            pipeline(gpu, &refit_pipelines, &refit, entry, &[(shaders::GROUP, f64::from(threads))])
+            pipeline(gpu, cache, &refit_pipelines, &refit, entry, &[(shaders::GROUP, f64::from(threads))])
         };
         Self {
             refit_level: fit("refit_level", GROUP_THREADS),
@@ -56,12 +62,13 @@ impl Pipelines {
             refit_layout,
             tracing_layout,
             made: HashMap::new(),
+            compiled,
         }
     }
 
     /// The pipeline for frames that have this.
     pub(super) fn tracing(&mut self, gpu: &Gpu, kernel: Kernel, has: Has) -> &wgpu::ComputePipeline {
-        let Self { tracing_layout, modules, made, .. } = self;
+        let Self { tracing_layout, modules, made, compiled, .. } = self;
         made.entry((kernel, has)).or_insert_with(|| {
             let (entry, text): (_, fn(u32) -> String) = match kernel {
                 Kernel::Trace => ("trace", shaders::trace),
@@ -69,7 +76,13 @@ impl Pipelines {
             };
             let module =
                 modules.entry((kernel, has.far)).or_insert_with(|| module(gpu, entry, &text(has.far)));
-            pipeline(gpu, tracing_layout, module, entry, &constants(has))
+            let cache = compiled.as_ref().map(Compiled::cache);
+            let made = pipeline(gpu, cache, tracing_layout, module, entry, &constants(has));
+            // at once: a run may be killed
+            if let Some(compiled) = compiled {
+                compiled.keep();
+            }
+            made
         })
     }
 }
@@ -126,6 +139,7 @@ fn module(gpu: &Gpu, label: &str, text: &str) -> wgpu::ShaderModule {
 
 fn pipeline(
     gpu: &Gpu,
+    cache: Option<&wgpu::PipelineCache>,
     layout: &wgpu::PipelineLayout,
     module: &wgpu::ShaderModule,
     entry: &str,
@@ -140,6 +154,6 @@ fn pipeline(
             constants,
             zero_initialize_workgroup_memory: false,
         },
-        cache: None,
+        cache,
     })
 }
