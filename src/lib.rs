@@ -8,7 +8,7 @@
 //! | [`cli`] | what was typed, what it means, a call below; the only room that prints |
 //! | [`mod@bench`] | workloads, timing, peers, charts |
 //! | [`run`] | a run: reader, device and writer stages, resume, events, report; warm against cold |
-//! | [`device`] | the device trait, the CPU device, the fake device, the conformance suite |
+//! | [`device`] | the device trait, the CPU, GPUs (wgpu), the fake device, the conformance suite, the registry |
 //! | [`kernel`] | camera rays, materials, lights, sampling: what one ray does |
 //! | [`plan`] | what a device must do before it can trace a frame, as a value (pure) |
 //! | [`accel`] | bounding volume hierarchies and the canonical hit |
