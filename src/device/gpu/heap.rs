@@ -1,6 +1,7 @@
 //! One large buffer in which parts have places: they come and go, and the buffer grows.
 
 use super::adapter::Gpu;
+use crate::device::DeviceError;
 use std::collections::BTreeMap;
 use std::ops::Range;
 
@@ -26,6 +27,14 @@ pub(super) struct Full {
     pub(super) needed_bytes: u64,
     /// Bytes that it may have.
     pub(super) most_bytes: u64,
+}
+
+impl Full {
+    /// What a device says of it.
+    pub(super) fn error(self, device: &str) -> DeviceError {
+        let Self { needed_bytes, most_bytes } = self;
+        DeviceError::OutOfMemory { device: device.to_string(), needed_bytes, budget_bytes: most_bytes }
+    }
 }
 
 impl Heap {

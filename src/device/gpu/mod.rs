@@ -8,6 +8,7 @@ mod film;
 mod fits;
 mod frame;
 mod heap;
+mod parts;
 mod pipelines;
 pub mod records;
 mod resident;
@@ -112,12 +113,7 @@ impl GpuDevice {
         if self.open.is_none() {
             let gpu = self.adapter.open()?;
             let pipelines = Pipelines::new(&gpu, self.store.as_ref());
-            let full = |full: heap::Full| DeviceError::OutOfMemory {
-                device: self.info.name.clone(),
-                needed_bytes: full.needed_bytes,
-                budget_bytes: full.most_bytes,
-            };
-            let resident = Resident::new(&gpu).map_err(full)?;
+            let resident = Resident::new(&gpu).map_err(|full| full.error(&self.info.name))?;
             gpu.check()?;
             let (buffers, boxes) = (Buffers::default(), HashMap::new());
             self.open = Some(Open {
@@ -179,7 +175,7 @@ impl GpuDevice {
         let mut boxes = HashMap::new();
         let box_of = |geometry: &Geometry| {
             let name = geometry.positions.hash();
-            let make = || resident::world_box(&geometry.positions.0, pool);
+            let make = || parts::world_box(&geometry.positions.0, pool);
             *boxes.entry(name).or_insert_with(|| before.get(&name).copied().unwrap_or_else(make))
         };
         let not_resident = |object| DeviceError::NotResident { device: info.name.clone(), object };
@@ -189,10 +185,14 @@ impl GpuDevice {
             Records::new(frame, shot, output, &open.resident, background, box_of).map_err(not_resident)?;
         open.boxes = boxes;
         let top = open.place_top(&mut records, info)?;
-        let fits = Fits::new(&std::mem::take(&mut open.resident.fits));
-        let begun = open.ground().begin(&fits, &records, shot, output, stop);
+        let waiting = std::mem::take(&mut open.resident.fits);
+        let begun = open.ground().begin(&Fits::new(&waiting), &records, shot, output, stop);
         // the queue keeps the order: what is written there next comes after this frame
         open.resident.heaps.nodes.give(top);
+        if matches!(begun, Err(DeviceError::OutOfMemory { .. })) {
+            // nothing was handed over
+            open.resident.fits = waiting;
+        }
         open.under_way.push_back((begun?, start));
         Ok(())
     }
@@ -250,13 +250,8 @@ impl Open {
         if let Some((_, place)) = self.background.take() {
             texels.give(place);
         }
-        let bytes = resident::texels(texture);
-        let full = |full: heap::Full| DeviceError::OutOfMemory {
-            device: info.name.clone(),
-            needed_bytes: full.needed_bytes,
-            budget_bytes: full.most_bytes,
-        };
-        let place = texels.take(&self.gpu, bytes.len() as u64 / 4).map_err(full)?;
+        let bytes = parts::texels(texture);
+        let place = texels.take(&self.gpu, bytes.len() as u64 / 4).map_err(|full| full.error(&info.name))?;
         texels.write(&self.gpu, place.start, bytes);
         self.background = Some((name, place.clone()));
         Ok(place.start)
@@ -267,13 +262,8 @@ impl Open {
         if records.top.is_empty() {
             return Ok(0..0);
         }
-        let full = |full: heap::Full| DeviceError::OutOfMemory {
-            device: info.name.clone(),
-            needed_bytes: full.needed_bytes,
-            budget_bytes: full.most_bytes,
-        };
         let nodes = &mut self.resident.heaps.nodes;
-        let place = nodes.take(&self.gpu, records.top.len() as u64).map_err(full)?;
+        let place = nodes.take(&self.gpu, records.top.len() as u64).map_err(|full| full.error(&info.name))?;
         let moved: Vec<PackedNode> = records
             .top
             .iter()

@@ -2,15 +2,15 @@
 
 use super::adapter::Gpu;
 use super::heap::{Full, Heap};
+use super::parts::{move_nodes, texels, vertices, words};
 use super::records::{ABSENT, RefitTree};
-use crate::accel::{Aabb, NODE_BYTES, PackedNode, PackedTree, Quality, TRIANGLE_BYTES};
+use crate::accel::{NODE_BYTES, PackedTree, Quality, TRIANGLE_BYTES};
 use crate::clock::Stopwatch;
 use crate::device::{DeviceError, DeviceInfo, UpdateCost};
 use crate::math::LINEAR_FROM_SRGB8;
 use crate::plan::{Residency, Step, TreeState, UpdatePlan, tree_name};
-use crate::scene::{Frame, Geometry, Part, PartHash, Texels, Texture, Triangles};
+use crate::scene::{Frame, Geometry, Part, PartHash, Triangles};
 use rayon::ThreadPool;
-use rayon::prelude::*;
 use std::collections::{HashMap, HashSet};
 use std::ops::Range;
 
@@ -18,8 +18,6 @@ use std::ops::Range;
 const TOP_NODES: u32 = 64;
 /// A GPU traces so fast that a tree is worth more than the least work; no splits: a tree is refitted.
 const QUALITY: Quality = Quality::Medium;
-/// Triangles whose vertices one thread looks up together.
-const GRAIN: usize = 4096;
 
 /// The buffers that parts and trees have places in.
 #[derive(Debug)]
@@ -245,8 +243,7 @@ impl Resident {
             self.forget(idle);
             self.residency.evict(idle);
         }
-        let full = |full: Full| means.out_of_memory(full.needed_bytes, full.most_bytes);
-        heap(&mut self.heaps).take(means.gpu, units).map_err(full)
+        heap(&mut self.heaps).take(means.gpu, units).map_err(|full| full.error(&means.info.name))
     }
 
     fn build(&mut self, name: PartHash, geometry: &Geometry, means: &Means) -> Result<(), DeviceError> {
@@ -283,31 +280,53 @@ impl Resident {
         means: &Means,
     ) -> Result<GpuTree, DeviceError> {
         let PackedTree { mut nodes, order, by_height, heights, .. } = packed;
-        let place_nodes = self.take(means, |heaps| &mut heaps.nodes, 1 + nodes.len() as u64)?;
-        let root = place_nodes.start + 1;
-        let place_triangles = self.take(means, |heaps| &mut heaps.triangles, order.len() as u64)?;
-        let place_vertices = self.take(means, |heaps| &mut heaps.words, 4 * order.len() as u64)?;
         let mut lists = by_height;
         lists.extend(heights.iter().map(|h| h.start));
         lists.extend(heights.last().map(|h| h.end));
-        let place_lists = self.take(means, |heaps| &mut heaps.words, lists.len() as u64)?;
-        move_nodes(&mut nodes, root, place_triangles.start);
-        let gpu = means.gpu;
-        self.heaps.nodes.write(gpu, root, bytemuck::cast_slice(&nodes));
-        let vertices = vertices(&order, triangles, means.pool);
-        self.heaps.words.write(gpu, place_vertices.start, bytemuck::cast_slice(&vertices));
-        self.heaps.words.write(gpu, place_lists.start, bytemuck::cast_slice(&lists));
         self.next_mark += 1;
-        Ok(GpuTree {
+        let mut tree = GpuTree {
             mark: self.next_mark,
-            nodes: place_nodes,
-            triangles: place_triangles,
-            vertices: place_vertices,
-            lists: place_lists,
+            nodes: 0..0,
+            triangles: 0..0,
+            vertices: 0..0,
+            lists: 0..0,
             heights,
             order,
             corners: triangles.hash(),
-        })
+        };
+        if let Err(error) = self.take_places(&mut tree, nodes.len(), lists.len(), means) {
+            self.give_places(tree);
+            return Err(error);
+        }
+        let (gpu, root) = (means.gpu, tree.nodes.start + 1);
+        move_nodes(&mut nodes, root, tree.triangles.start);
+        self.heaps.nodes.write(gpu, root, bytemuck::cast_slice(&nodes));
+        let vertices = vertices(&tree.order, triangles, means.pool);
+        self.heaps.words.write(gpu, tree.vertices.start, bytemuck::cast_slice(&vertices));
+        self.heaps.words.write(gpu, tree.lists.start, bytemuck::cast_slice(&lists));
+        Ok(tree)
+    }
+
+    fn take_places(
+        &mut self,
+        tree: &mut GpuTree,
+        nodes: usize,
+        lists: usize,
+        means: &Means,
+    ) -> Result<(), DeviceError> {
+        let triangles = tree.order.len() as u64;
+        tree.nodes = self.take(means, |heaps| &mut heaps.nodes, 1 + nodes as u64)?;
+        tree.triangles = self.take(means, |heaps| &mut heaps.triangles, triangles)?;
+        tree.vertices = self.take(means, |heaps| &mut heaps.words, 4 * triangles)?;
+        tree.lists = self.take(means, |heaps| &mut heaps.words, lists as u64)?;
+        Ok(())
+    }
+
+    fn give_places(&mut self, tree: GpuTree) {
+        self.heaps.nodes.give(tree.nodes);
+        self.heaps.triangles.give(tree.triangles);
+        self.heaps.words.give(tree.vertices);
+        self.heaps.words.give(tree.lists);
     }
 
     /// Asks for a fit of a tree to a geometry's positions before the next frame is traced.
@@ -357,10 +376,7 @@ impl Resident {
             Some(Place::Host) | None => {}
         }
         if let Some(tree) = self.trees.remove(&name) {
-            self.heaps.nodes.give(tree.nodes);
-            self.heaps.triangles.give(tree.triangles);
-            self.heaps.words.give(tree.vertices);
-            self.heaps.words.give(tree.lists);
+            self.give_places(tree);
         }
     }
 
@@ -383,62 +399,6 @@ impl Resident {
     /// The tree over a geometry.
     pub(super) fn tree(&self, geometry: &Geometry) -> Option<&GpuTree> {
         self.trees.get(&tree_name(geometry))
-    }
-}
-
-/// For each place of a leaf the vertices of its triangle, and its number.
-fn vertices(order: &[u32], triangles: &Triangles, pool: &ThreadPool) -> Vec<[u32; 4]> {
-    let of = |&number: &u32| {
-        let [a, b, c] = triangles.0[number as usize];
-        [a, b, c, number]
-    };
-    pool.install(|| order.par_iter().with_min_len(GRAIN).map(of).collect())
-}
-
-/// Counts a tree's nodes and triangles from the heaps' beginnings.
-fn move_nodes(nodes: &mut [PackedNode], first_node: u32, first_triangle: u32) {
-    for node in nodes {
-        node.child_base += first_node;
-        node.triangle_base += first_triangle;
-    }
-}
-
-/// The words of a part that kernels read.
-fn words(part: PartHash, geometry: &Geometry) -> Option<&[u8]> {
-    let Geometry { positions, triangles, texcoords, normals, colors, material_runs, .. } = geometry;
-    if part == positions.hash() {
-        return Some(bytemuck::cast_slice(&positions.0));
-    }
-    if part == triangles.hash() {
-        return Some(bytemuck::cast_slice(&triangles.0));
-    }
-    if part == material_runs.hash() {
-        return Some(bytemuck::cast_slice(&material_runs.0));
-    }
-    if let Some(a) = texcoords {
-        if part == a.values.hash() {
-            return Some(bytemuck::cast_slice(&a.values.0));
-        }
-        if part == a.corners.hash() {
-            return Some(bytemuck::cast_slice(&a.corners.0));
-        }
-    }
-    if let Some(a) = normals {
-        if part == a.values.hash() {
-            return Some(bytemuck::cast_slice(&a.values.0));
-        }
-        if part == a.corners.hash() {
-            return Some(bytemuck::cast_slice(&a.corners.0));
-        }
-    }
-    colors.as_ref().filter(|c| part == c.hash()).map(|c| bytemuck::cast_slice(&c.0))
-}
-
-/// The texels as the device has them.
-pub(super) fn texels(texture: &Texture) -> &[u8] {
-    match &texture.texels {
-        Texels::U8(texels) => bytemuck::cast_slice(texels),
-        Texels::F32(texels) => bytemuck::cast_slice(texels),
     }
 }
 
@@ -469,14 +429,4 @@ fn refuse_beyond_bindings(frame: &Frame, means: &Means) -> Result<(), DeviceErro
         }
         _ => Ok(()),
     }
-}
-
-/// The box of what is finite of some positions, a little larger than any triangle's own box.
-pub(super) fn world_box(positions: &[[f32; 3]], pool: &ThreadPool) -> Aabb {
-    let finite = |p: &&[f32; 3]| p.iter().all(|x| x.is_finite());
-    let point = |p: &[f32; 3]| Aabb { min: *p, max: *p };
-    let union = |a: Aabb, b: Aabb| a.union(&b);
-    pool.install(|| {
-        positions.par_iter().with_min_len(GRAIN).filter(finite).map(point).reduce(|| Aabb::EMPTY, union)
-    })
 }
