@@ -197,7 +197,8 @@ fn search_along(world: Ray, any: bool, search: ptr<function, Search>) {
     } else {
         group = root_group(shot.top_node);
         let reach = abs(world.origin);
-        enters_all = !(reach.x <= shot.top_reach && reach.y <= shot.top_reach && reach.z <= shot.top_reach);
+        let most = bitcast<f32>(tables[shot.top_reach]);
+        enters_all = !(reach.x <= most && reach.y <= most && reach.z <= most);
     }
     if (shot.object_count == 0u || group.x == ABSENT) {
         return;

@@ -38,7 +38,7 @@ pub struct ShotConstants {
     pub emitter_count: u32,
     pub object_count: u32,
     pub top_node: u32,
-    pub top_reach: f32,
+    pub top_reach: u32,
     pub top_objects: u32,
     pub material_slots: u32,
     pub gain: f32,

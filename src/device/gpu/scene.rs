@@ -115,6 +115,8 @@ impl Records {
         let lights: Vec<LightRecord> = shot.lights.iter().map(LightRecord::new).collect();
         let top_objects = tables.len() as u32;
         tables.extend(&top.tree.order);
+        let top_reach = tables.len() as u32;
+        tables.push(top.reach.to_bits());
         let material_slots = tables.len() as u32;
         tables.extend(world.material_slots());
         let code_steps = tables.len() as u32;
@@ -148,7 +150,7 @@ impl Records {
             emitter_count: emitters.emitters.len() as u32,
             object_count: objects.len() as u32,
             top_node: ABSENT,
-            top_reach: top.reach,
+            top_reach,
             top_objects,
             material_slots,
             gain,
