@@ -32,7 +32,7 @@ pub struct PackedNode {
     pub child_base: u32,
     /// The first triangle, by its place.
     pub triangle_base: u32,
-    /// For each slot [`INNER`] with the slot, or a leaf: its triangles after the node's first in the lower five bits, one
+    /// For each slot `INNER` with the slot, or a leaf: its triangles after the node's first in the lower five bits, one
     /// of the upper three bits for each triangle; 0 where there is nothing.
     pub meta: [[u8; 4]; 2],
     /// By side (lesser, greater), axis, slot.
