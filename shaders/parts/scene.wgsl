@@ -39,8 +39,8 @@ struct ShotConstants {
     object_count: u32,
     // The root of the level above the objects in `nodes`; ABSENT where rays ask one object after the other.
     top_node: u32,
-    // Rays whose origin is as far away, on each axis, as the float at this place in `tables` says may use it. It is not here:
-    // some drivers compile a kernel anew for each value of a constant that it branches on.
+    // Rays whose origin is as far away, on each axis, as the float at this place in `tables` says may use it. It is not here, so
+    // that no kernel branches on a constant that changes from frame to frame.
     top_reach: u32,
     // For each of its leaves the object: from here on in `tables`.
     top_objects: u32,
