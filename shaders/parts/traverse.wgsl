@@ -180,6 +180,22 @@ fn root_group(root: u32) -> vec2<u32> {
     return vec2<u32>(root, 0x80000000u);
 }
 
+// The entries of a thread's stack by their place.
+fn put_on_stack(place: u32, group: vec2<u32>) {
+    if (place < NEAR) {
+        near_stack[place * GROUP + thread_in_group] = group;
+    } else {
+        far_stack[min(place - NEAR, FAR - 1u)] = group;
+    }
+}
+
+fn on_stack(place: u32) -> vec2<u32> {
+    if (place < NEAR) {
+        return near_stack[place * GROUP + thread_in_group];
+    }
+    return far_stack[min(place - NEAR, FAR - 1u)];
+}
+
 // Looks for a candidate; with `any` the first one found ends the search.
 fn search_along(world: Ray, any: bool, search: ptr<function, Search>) {
     var size = 0u;
@@ -217,11 +233,7 @@ fn search_along(world: Ray, any: bool, search: ptr<function, Search>) {
             let bit = firstLeadingBit(group.y);
             group.y &= ~(1u << bit);
             if (group.y > 0x00ffffffu) {
-                if (size < NEAR) {
-                    near_stack[size * GROUP + thread_in_group] = group;
-                } else {
-                    far_stack[min(size - NEAR, FAR - 1u)] = group;
-                }
+                put_on_stack(size, group);
                 size += 1u;
             }
             let slot = (bit - 24u) ^ ray.turn;
@@ -248,19 +260,11 @@ fn search_along(world: Ray, any: bool, search: ptr<function, Search>) {
                 }
                 // what is left of this node waits
                 if (group.y > 0x00ffffffu) {
-                    if (size < NEAR) {
-                        near_stack[size * GROUP + thread_in_group] = group;
-                    } else {
-                        far_stack[min(size - NEAR, FAR - 1u)] = group;
-                    }
+                    put_on_stack(size, group);
                     size += 1u;
                 }
                 if (leaves.y != 0u) {
-                    if (size < NEAR) {
-                        near_stack[size * GROUP + thread_in_group] = leaves;
-                    } else {
-                        far_stack[min(size - NEAR, FAR - 1u)] = leaves;
-                    }
+                    put_on_stack(size, leaves);
                     size += 1u;
                 }
                 floor_of_object = size;
@@ -285,11 +289,7 @@ fn search_along(world: Ray, any: bool, search: ptr<function, Search>) {
                 return;
             }
             size -= 1u;
-            if (size < NEAR) {
-                group = near_stack[size * GROUP + thread_in_group];
-            } else {
-                group = far_stack[min(size - NEAR, FAR - 1u)];
-            }
+            group = on_stack(size);
         }
     }
 }
