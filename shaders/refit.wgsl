@@ -32,7 +32,7 @@ struct RefitLevel {
     trees: u32,
 }
 
-@group(0) @binding(0) var<uniform> level: RefitLevel;
+@group(0) @binding(0) var<storage, read> level: RefitLevel;
 @group(0) @binding(1) var<storage, read> trees: array<RefitTree>;
 @group(0) @binding(2) var<storage, read> words: array<u32>;
 @group(0) @binding(3) var<storage, read_write> nodes: array<vec4<u32>>;

@@ -1,10 +1,32 @@
 // The film: one thread takes some of a pixel's samples, the pixel's lanes are added up in the workgroup. Twin of
 // src/kernel/tile.rs.
 
-var<workgroup> lane_sums: array<vec4<f32>, GROUP>;
-var<workgroup> lane_albedos: array<vec3<f32>, GROUP>;
-// The words of the tile's pixels, row by row.
-var<workgroup> tile_words: array<u32, 4u * GROUP>;
+// What each thread has, for others of its workgroup: in the memory of the stacks, once all have traced.
+fn hand_over(thread: u32, row: vec4<u32>) {
+    near_stack[2u * thread] = row.xy;
+    near_stack[2u * thread + 1u] = row.zw;
+}
+
+fn handed_over(thread: u32) -> vec4<u32> {
+    return vec4<u32>(near_stack[2u * thread], near_stack[2u * thread + 1u]);
+}
+
+// The sum over a pixel's lanes, for the first of them.
+fn sum_of_lanes(local: u32, lanes: u32, own: vec4<f32>) -> vec4<f32> {
+    if (lanes == 1u) {
+        return own;
+    }
+    workgroupBarrier();
+    hand_over(local, bitcast<vec4<u32>>(own));
+    workgroupBarrier();
+    var total = own;
+    if (local % lanes == 0u) {
+        for (var lane = 1u; lane < lanes; lane += 1u) {
+            total += bitcast<vec4<f32>>(handed_over(local + lane));
+        }
+    }
+    return total;
+}
 
 // Every other bit of a number of up to six, from the lowest on.
 fn even_bits(number: u32) -> u32 {
@@ -51,48 +73,36 @@ fn trace(
     if (is_inside) {
         add_samples(pixel, local % lanes, lanes);
     }
-    lane_sums[local] = vec4<f32>(sum.rgb, sum.through);
-    if (HAS_ALBEDO) {
-        lane_albedos[local] = sum.albedo;
-    }
-    // its barriers are also those between what the lanes write above and what is read below
     add_counts(local, group.y * groups.x + group.x);
-    if (is_inside && local % lanes == 0u) {
-        let samples = f32(shot.samples);
-        var total = lane_sums[local];
-        for (var lane = 1u; lane < lanes; lane += 1u) {
-            total += lane_sums[local + lane];
-        }
-        let mean = total / samples;
-        // its place in the tile, row by row
-        let in_tile = (even_bits(number >> 1u) << ((bits + 1u) / 2u)) + even_bits(number);
-        let first = FILM_WORDS * in_tile;
-        if (FILM_WORDS == 1u) {
-            let shown = mean.xyz * shot.gain;
-            tile_words[first] = code_of(shown.x) | (code_of(shown.y) << 8u) | (code_of(shown.z) << 16u);
-        } else {
-            tile_words[first] = bitcast<u32>(mean.x);
-            tile_words[first + 1u] = bitcast<u32>(mean.y);
-            tile_words[first + 2u] = bitcast<u32>(mean.z);
-        }
-        if (FILM_WORDS == 4u) {
-            tile_words[first + 3u] = bitcast<u32>(mean.w);
-        }
-        if (HAS_ALBEDO) {
-            var albedo = lane_albedos[local];
-            for (var lane = 1u; lane < lanes; lane += 1u) {
-                albedo += lane_albedos[local + lane];
-            }
-            let mean_albedo = bitcast<vec3<u32>>(albedo / samples);
+    let samples = f32(shot.samples);
+    let mean = sum_of_lanes(local, lanes, vec4<f32>(sum.rgb, sum.through)) / samples;
+    let has_pixel = is_inside && local % lanes == 0u;
+    if (HAS_ALBEDO) {
+        let mean_albedo = sum_of_lanes(local, lanes, vec4<f32>(sum.albedo, 0.0)) / samples;
+        if (has_pixel) {
             let place = pixel.y * shot.size.x + pixel.x;
-            let albedo_first = FILM_WORDS * shot.size.x * shot.size.y + 3u * place;
-            film[albedo_first] = mean_albedo.x;
-            film[albedo_first + 1u] = mean_albedo.y;
-            film[albedo_first + 2u] = mean_albedo.z;
+            let first = FILM_WORDS * shot.size.x * shot.size.y + 3u * place;
+            film[first] = bitcast<u32>(mean_albedo.x);
+            film[first + 1u] = bitcast<u32>(mean_albedo.y);
+            film[first + 2u] = bitcast<u32>(mean_albedo.z);
         }
+    }
+    if (FILM_WORDS == 1u) {
+        if (has_pixel) {
+            let shown = mean.xyz * shot.gain;
+            film[pixel.y * shot.size.x + pixel.x] =
+                code_of(shown.x) | (code_of(shown.y) << 8u) | (code_of(shown.z) << 16u);
+        }
+        return;
+    }
+    // neighbours write words side by side: the film may lie beyond a bus that is slow for less
+    workgroupBarrier();
+    if (local % lanes == 0u) {
+        // by the pixel's place in the tile, row by row
+        let in_tile = (even_bits(number >> 1u) << ((bits + 1u) / 2u)) + even_bits(number);
+        hand_over(in_tile, bitcast<vec4<u32>>(mean));
     }
     workgroupBarrier();
-    // neighbours write words side by side: the film may lie beyond a bus that is slow for less
     let columns = 1u << ((bits + 1u) / 2u);
     let corner = vec2<u32>(group.x * columns, slice.first_row + (group.y << (bits / 2u)));
     let row_words = FILM_WORDS * columns;
@@ -101,7 +111,8 @@ fn trace(
         let column_word = word % row_words;
         let is_in_row = corner.x + column_word / FILM_WORDS < shot.size.x;
         if (is_in_row && row < min(shot.size.y, slice.end_row)) {
-            film[FILM_WORDS * (row * shot.size.x + corner.x) + column_word] = tile_words[word];
+            let place = handed_over(word / FILM_WORDS);
+            film[FILM_WORDS * (row * shot.size.x + corner.x) + column_word] = place[word % FILM_WORDS];
         }
     }
 }

@@ -123,8 +123,7 @@ fn records_of_trace() -> Vec<Layout> {
             first_part,
             meshes,
             mesh_count,
-            runs,
-            run_count,
+            triangle_slots,
             slots,
             corners,
             colors,
@@ -132,7 +131,9 @@ fn records_of_trace() -> Vec<Layout> {
             normal_corners,
             texcoords,
             texcoord_corners,
-            pad,
+            pad_a,
+            pad_b,
+            pad_c,
         }),
     ]
 }

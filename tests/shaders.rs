@@ -129,7 +129,6 @@ fn kernels_bind_what_the_host_binds() {
             let place = found.get_mut(binding.binding as usize);
             let place = place.unwrap_or_else(|| panic!("{name}: {called}: binding {}", binding.binding));
             let access = match variable.space {
-                AddressSpace::Uniform => Access::Uniform,
                 AddressSpace::Storage { access } if access == StorageAccess::LOAD => Access::Read,
                 AddressSpace::Storage { .. } => Access::Write,
                 space => panic!("{name}: {called} is in {space:?}"),

@@ -46,10 +46,29 @@ fn start_path(ray: Ray) {
     traced.camera += 1u;
 }
 
+// A sample starts at the eye.
+fn start_sample(at: Sample) {
+    let place = vec2<f32>(at.pixel) + place_in_pixel(at.index, shot.samples, at.pixel, shot.seed);
+    start_path(camera_ray(place.x, place.y));
+}
+
 // Adds a pixel's samples `lane`, `lane + lanes` and so on. All rays but those to lights are traced at one place: a driver
 // puts a whole traversal wherever there is a call.
 fn add_samples(pixel: vec2<u32>, lane: u32, lanes: u32) {
     var at = Sample(pixel, lane, 0u);
+    if (HAS_ONE_RAY) {
+        // without a loop a driver keeps nothing for rays that never come
+        if (lane < shot.samples) {
+            start_sample(at);
+            let hit = closest(path.ray, path.after);
+            if (hit.object == ABSENT) {
+                escape();
+            } else {
+                _ = meet(hit, at);
+            }
+        }
+        return;
+    }
     var next = lane;
     var is_under_way = false;
     loop {
@@ -59,8 +78,7 @@ fn add_samples(pixel: vec2<u32>, lane: u32, lanes: u32) {
             }
             at = Sample(pixel, next, 0u);
             next += lanes;
-            let place = vec2<f32>(pixel) + place_in_pixel(at.index, shot.samples, pixel, shot.seed);
-            start_path(camera_ray(place.x, place.y));
+            start_sample(at);
         }
         let hit = closest(path.ray, path.after);
         is_under_way = false;
@@ -105,7 +123,10 @@ fn meet(hit: Hit, at: Sample) -> bool {
                 path.sees_first = false;
             }
         }
-        let covered = cover(m);
+        var covered = 1.0;
+        if (HAS_BRANCHES || GOES_ON) {
+            covered = cover(m);
+        }
         let weight = path.weight * covered;
         path.weight *= 1.0 - covered;
         let view = -path.ray.direction;

@@ -146,9 +146,9 @@ struct ObjectRecord {
     // For each of its meshes the first triangle: from here on in `tables`; and how many there are.
     meshes: u32,
     mesh_count: u32,
-    // Pairs (first triangle, slot), and how many there are.
-    runs: u32,
-    run_count: u32,
+    // Whose materials its triangles have: the first triangle of the last slot, that slot, then the slots of the triangles before
+    // it. ABSENT without materials.
+    triangle_slots: u32,
     // For each slot the material: from here on in `tables`.
     slots: u32,
     // Three position indices for each triangle.
@@ -158,7 +158,9 @@ struct ObjectRecord {
     normal_corners: u32,
     texcoords: u32,
     texcoord_corners: u32,
-    pad: vec2<u32>,
+    pad_a: u32,
+    pad_b: u32,
+    pad_c: u32,
 }
 
 const PLACED: u32 = 1u;
@@ -193,8 +195,9 @@ const REFLECTION_NONE: u32 = 0u;
 const REFLECTION_SPHERE: u32 = 1u;
 const REFLECTION_CUBE: u32 = 2u;
 
-@group(0) @binding(0) var<uniform> shot: ShotConstants;
-@group(0) @binding(1) var<uniform> slice: Slice;
+// Also single records are in storage: of uniforms llvmpipe makes constants, and a kernel anew for each frame.
+@group(0) @binding(0) var<storage, read> shot: ShotConstants;
+@group(0) @binding(1) var<storage, read> slice: Slice;
 @group(0) @binding(2) var<storage, read> lights: array<LightRecord>;
 @group(0) @binding(3) var<storage, read> emitters: array<EmitterRecord>;
 @group(0) @binding(4) var<storage, read> materials: array<MaterialRecord>;
@@ -229,6 +232,8 @@ override GOES_ON: bool = true;
 // Whether there is one light, and it is no area light.
 override HAS_ONE_LIGHT: bool = false;
 override HAS_ALBEDO: bool = true;
+// Whether a thread takes one sample at most, of a path that ends at its first surface.
+override HAS_ONE_RAY: bool = false;
 // Words of the film for each pixel: 1 for codes of 8 bits on the sRGB curve, 3 for linear RGB, 4 with what the background
 // counts for.
 override FILM_WORDS: u32 = 4u;

@@ -5,9 +5,9 @@ override SINGLE_TREE: bool = false;
 
 // A group of children that wait: the first one's place and which of them were entered; the first entries of each thread's
 // stack are in the workgroup's memory, the others in its own, which is cleared for each thread: as many as a frame's trees
-// need, see `far` in src/device/gpu/shaders.rs.
-const NEAR: u32 = 6u;
-const FAR: u32 = 44u;
+// need, see `far` in src/device/gpu/shaders.rs. The less a workgroup has of its memory, the more of them run at once.
+const NEAR: u32 = 2u;
+const FAR: u32 = 48u;
 var<workgroup> near_stack: array<vec2<u32>, NEAR * GROUP>;
 var<private> far_stack: array<vec2<u32>, FAR>;
 // Set by each kernel before it traces.
@@ -49,26 +49,31 @@ struct Entered {
     leaves: vec2<u32>,
 }
 
-// Of four children those that are entered, as bits of `Entered`.
-fn entered_bits(
-    entry: vec4<f32>,
-    exit: vec4<f32>,
-    distance: f32,
-    meta_bytes: u32,
-    turn4: u32,
-) -> u32 {
-    let is_inner = (meta_bytes & (meta_bytes << 1u)) & 0x10101010u;
-    let inner_mask = (is_inner >> 4u) * 0xffu;
-    let place = unpack4xU8((meta_bytes ^ (turn4 & inner_mask)) & 0x1f1f1f1fu);
-    let bits = unpack4xU8((meta_bytes >> 5u) & 0x07070707u) << place;
-    let of_entered = select(vec4<u32>(0u), bits, entry <= min(exit, vec4<f32>(distance)));
-    return (of_entered.x | of_entered.y) | (of_entered.z | of_entered.w);
+// Turns the slots of a mask: slot i becomes slot i ^ turn.
+fn turned(mask: u32, turn: u32) -> u32 {
+    var slots = mask;
+    slots = select(slots, ((slots & 0x55u) << 1u) | ((slots >> 1u) & 0x55u), (turn & 1u) != 0u);
+    slots = select(slots, ((slots & 0x33u) << 2u) | ((slots >> 2u) & 0x33u), (turn & 2u) != 0u);
+    return select(slots, ((slots & 0x0fu) << 4u) | (slots >> 4u), (turn & 4u) != 0u);
+}
+
+// Those of a node's children whose slots are in a mask; the node's first two rows.
+fn entered_children(head: vec4<u32>, links: vec4<u32>, mask: u32, turn: u32) -> Entered {
+    let inner = head.w >> 24u;
+    var in_leaves = 0u;
+    for (var left = mask & ~inner; left != 0u; left &= left - 1u) {
+        let slot = firstTrailingBit(left);
+        let leaf = select(links.z, links.w, slot >= 4u) >> (8u * (slot & 3u));
+        in_leaves |= ((leaf >> 5u) & 7u) << (leaf & 31u);
+    }
+    return Entered(vec2<u32>(links.x, (turned(mask & inner, turn) << 24u) | inner), vec2<u32>(links.y, in_leaves));
 }
 
 // Planes are taken as real numbers and widened by more than what the computation may be off, so that nothing inside a box is
 // entered before it, nor met where it is missed. A plane's distance is byte·step + start: with u = 2^-24 start is off by 2u of
 // itself, step is exact, the product and the sum add 2u of at most start and 256 steps, and an own box's plane is off by 2u of
-// no more than that: 6u of both together. 16u are taken.
+// no more than that: 6u of both together. And a ray leaves a box later by the factor of slab.rs, 16u of the same. 32u are
+// taken.
 fn enter(node: u32, ray: TracedRay, distance: f32) -> Entered {
     let row = 5u * node;
     let head = nodes[row];
@@ -79,7 +84,7 @@ fn enter(node: u32, ray: TracedRay, distance: f32) -> Entered {
     let exponents = vec3<u32>(head.w & 0xffu, (head.w >> 8u) & 0xffu, (head.w >> 16u) & 0xffu);
     let step = bitcast<vec3<f32>>(exponents << vec3<u32>(23u)) * ray.inverse;
     let start = (bitcast<vec3<f32>>(head.xyz) - ray.origin) * ray.inverse;
-    let slack = fma(abs(step), vec3<f32>(256.0), abs(start)) * 0.00000095367431640625;
+    let slack = fma(abs(step), vec3<f32>(256.0), abs(start)) * 0.0000019073486328125;
     let near = start - slack;
     let far = start + slack;
     let back = ray.inverse < vec3<f32>(0.0);
@@ -89,19 +94,16 @@ fn enter(node: u32, ray: TracedRay, distance: f32) -> Entered {
     let far_y = select(high_yz.xy, low_xy.zw, back.y);
     let near_z = select(low_z_high_x.xy, high_yz.zw, back.z);
     let far_z = select(high_yz.zw, low_z_high_x.xy, back.z);
-    let turn4 = ray.turn * 0x01010101u;
     let low_near = array<u32, 3>(near_x.x, near_y.x, near_z.x);
     let low_far = array<u32, 3>(far_x.x, far_y.x, far_z.x);
     let high_near = array<u32, 3>(near_x.y, near_y.y, near_z.y);
     let high_far = array<u32, 3>(far_x.y, far_y.y, far_z.y);
-    let bits = entered_of_four(low_near, low_far, step, near, far, distance, links.z, turn4)
-        | entered_of_four(high_near, high_far, step, near, far, distance, links.w, turn4);
-    return Entered(
-        vec2<u32>(links.x, (bits & 0xff000000u) | (head.w >> 24u)),
-        vec2<u32>(links.y, bits & 0x00ffffffu),
-    );
+    let mask = entered_of_four(low_near, low_far, step, near, far, distance)
+        | (entered_of_four(high_near, high_far, step, near, far, distance) << 4u);
+    return entered_children(head, links, mask, ray.turn);
 }
 
+// Which of four children are entered; a slot without a child has no bits that come of it.
 fn entered_of_four(
     near_bytes: array<u32, 3>,
     far_bytes: array<u32, 3>,
@@ -109,8 +111,6 @@ fn entered_of_four(
     near: vec3<f32>,
     far: vec3<f32>,
     distance: f32,
-    meta_bytes: u32,
-    turn4: u32,
 ) -> u32 {
     let entry = max(
         max(planes(near_bytes[0], step.x, near.x), planes(near_bytes[1], step.y, near.y)),
@@ -118,9 +118,10 @@ fn entered_of_four(
     );
     let exit = min(
         min(planes(far_bytes[0], step.x, far.x), planes(far_bytes[1], step.y, far.y)),
-        planes(far_bytes[2], step.z, far.z),
-    ) * EXIT_FACTOR;
-    return entered_bits(entry, exit, distance, meta_bytes, turn4);
+        min(planes(far_bytes[2], step.z, far.z), vec4<f32>(distance)),
+    );
+    let slots = select(vec4<u32>(0u), vec4<u32>(1u, 2u, 4u, 8u), entry <= exit);
+    return (slots.x | slots.y) | (slots.z | slots.w);
 }
 
 // Distances of four planes.
@@ -140,20 +141,21 @@ fn test_triangle(
 ) -> bool {
     // the sheared axes are rows
     let row = 3u * place;
-    let row_x = triangles[row + ray.shear.axes.x];
-    let row_y = triangles[row + ray.shear.axes.y];
-    let row_z = triangles[row + ray.shear.axes.z];
-    let in_plane = hit_in_plane(
-        ray.shear,
-        bitcast<vec3<f32>>(row_x.xyz),
-        bitcast<vec3<f32>>(row_y.xyz),
-        bitcast<vec3<f32>>(row_z.xyz),
-    );
+    let last = ray.shear.last;
+    let row_x = triangles[row + select(last + 1u, 0u, last == 2u)];
+    let row_y = triangles[row + select(last - 1u, 2u, last == 0u)];
+    let row_z = triangles[row + last];
+    let x = bitcast<vec3<f32>>(row_x.xyz);
+    let y = bitcast<vec3<f32>>(row_y.xyz);
+    let z = bitcast<vec3<f32>>(row_z.xyz);
+    let origin = sheared_axes(last, ray.origin);
+    let in_plane = hit_in_plane(origin, ray.shear.shear, x, y, z);
     if (!(in_plane.distance > 0.0 && in_plane.distance <= (*search).before.distance)) {
         return false;
     }
-    let corners = corners_at(place);
-    let entry = box_entry(own_box(corners[0], corners[1], corners[2]), ray.origin, ray.inverse);
+    // a box is the same in any order of the axes
+    let own = own_box(vec3<f32>(x.x, y.x, z.x), vec3<f32>(x.y, y.y, z.y), vec3<f32>(x.z, y.z, z.z));
+    let entry = box_entry(own, origin, sheared_axes(last, ray.inverse));
     if (entry < 0.0) {
         return false;
     }
@@ -241,7 +243,7 @@ fn search_along(world: Ray, any: bool, search: ptr<function, Search>) {
             var distance = (*search).before.distance;
             var entered = enter(node, ray, distance);
             if (!SINGLE_TREE && in_top && enters_all) {
-                entered = all_children(node, ray.turn);
+                entered = entered_children(nodes[5u * node], nodes[5u * node + 1u], 0xffu, ray.turn);
             }
             group = entered.group;
             leaves = entered.leaves;
@@ -294,20 +296,6 @@ fn search_along(world: Ray, any: bool, search: ptr<function, Search>) {
     }
 }
 
-// All children of a node, as if they were entered.
-fn all_children(node: u32, turn: u32) -> Entered {
-    let head = nodes[5u * node];
-    let links = nodes[5u * node + 1u];
-    let everywhere = vec4<f32>(0.0);
-    let turn4 = turn * 0x01010101u;
-    let bits = entered_bits(everywhere, everywhere, 0.0, links.z, turn4)
-        | entered_bits(everywhere, everywhere, 0.0, links.w, turn4);
-    return Entered(
-        vec2<u32>(links.x, (bits & 0xff000000u) | (head.w >> 24u)),
-        vec2<u32>(links.y, bits & 0x00ffffffu),
-    );
-}
-
 // What was found.
 fn hit_of(search: Search) -> Hit {
     return Hit(search.before.distance, search.object, search.triangle, search.place, search.barycentric);
@@ -338,12 +326,8 @@ fn meets(ray: Ray, end: f32) -> u32 {
 
 // The corners of the triangle that was hit, in its object's space.
 fn corners_of(hit: Hit) -> array<vec3<f32>, 3> {
-    return corners_at(hit.place);
-}
-
-fn corners_at(place: u32) -> array<vec3<f32>, 3> {
-    let x = bitcast<vec4<f32>>(triangles[3u * place]);
-    let y = bitcast<vec4<f32>>(triangles[3u * place + 1u]);
-    let z = bitcast<vec4<f32>>(triangles[3u * place + 2u]);
+    let x = bitcast<vec4<f32>>(triangles[3u * hit.place]);
+    let y = bitcast<vec4<f32>>(triangles[3u * hit.place + 1u]);
+    let z = bitcast<vec4<f32>>(triangles[3u * hit.place + 2u]);
     return array<vec3<f32>, 3>(vec3<f32>(x.x, y.x, z.x), vec3<f32>(x.y, y.y, z.y), vec3<f32>(x.z, y.z, z.z));
 }

@@ -8,10 +8,8 @@
 
 // A ray as the edge test wants it: its largest component is along the last axis, the others are sheared away.
 struct ShearRay {
-    // The axes (x, y, z) of the sheared space.
-    axes: vec3<u32>,
-    // In their order.
-    origin: vec3<f32>,
+    // That axis: the sheared space has the other two, in cyclic order, and then it.
+    last: u32,
     shear: vec3<f32>,
 }
 
@@ -22,8 +20,7 @@ fn shear_ray(ray: Ray) -> ShearRay {
         last = 0u;
     }
     let d = sheared_axes(last, ray.direction);
-    let axes = select(select(vec3<u32>(0u, 1u, 2u), vec3<u32>(2u, 0u, 1u), last == 1u), vec3<u32>(1u, 2u, 0u), last == 0u);
-    return ShearRay(axes, sheared_axes(last, ray.origin), vec3<f32>(d.x / d.z, d.y / d.z, 1.0 / d.z));
+    return ShearRay(last, vec3<f32>(d.x / d.z, d.y / d.z, 1.0 / d.z));
 }
 
 // Coordinates in the order of the axes of the sheared space.
@@ -38,12 +35,12 @@ struct InPlane {
     barycentric: vec2<f32>,
 }
 
-// The corners' coordinates along each sheared axis.
-fn hit_in_plane(ray: ShearRay, along_x: vec3<f32>, along_y: vec3<f32>, along_z: vec3<f32>) -> InPlane {
+// The ray's origin, and the corners' coordinates, along each sheared axis.
+fn hit_in_plane(origin: vec3<f32>, shear: vec3<f32>, along_x: vec3<f32>, along_y: vec3<f32>, along_z: vec3<f32>) -> InPlane {
     // the corners as seen along the ray
-    let z = along_z - ray.origin.z;
-    let x = fma(vec3<f32>(-ray.shear.x), z, along_x - ray.origin.x);
-    let y = fma(vec3<f32>(-ray.shear.y), z, along_y - ray.origin.y);
+    let z = along_z - origin.z;
+    let x = fma(vec3<f32>(-shear.x), z, along_x - origin.x);
+    let y = fma(vec3<f32>(-shear.y), z, along_y - origin.y);
     let u = difference_of_products(x.z, y.y, y.z, x.y);
     let v = difference_of_products(x.x, y.z, y.x, x.z);
     let w = difference_of_products(x.y, y.x, y.y, x.x);
@@ -53,7 +50,7 @@ fn hit_in_plane(ray: ShearRay, along_x: vec3<f32>, along_y: vec3<f32>, along_z: 
         return InPlane(-1.0, vec2<f32>(0.0));
     }
     let depth = fma(u, z.x, fma(v, z.y, w * z.z));
-    return InPlane(depth / determinant * ray.shear.z, vec2<f32>(v / determinant, w / determinant));
+    return InPlane(depth / determinant * shear.z, vec2<f32>(v / determinant, w / determinant));
 }
 
 // Whether a place of the order comes before another.

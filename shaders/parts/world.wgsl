@@ -38,21 +38,14 @@ fn material_of(hit: Hit) -> u32 {
 
 // The place of a triangle's material in `materials`.
 fn material_at(object: u32, triangle: u32) -> u32 {
-    let runs = objects[object].runs;
-    var low = 0u;
-    var high = objects[object].run_count;
-    while (low < high) {
-        let middle = (low + high) / 2u;
-        if (words[runs + 2u * middle] <= triangle) {
-            low = middle + 1u;
-        } else {
-            high = middle;
-        }
-    }
-    if (low == 0u) {
+    let slots = objects[object].triangle_slots;
+    if (slots == ABSENT) {
         return 0u;
     }
-    let slot = words[runs + 2u * low - 1u];
+    var slot = words[slots + 1u];
+    if (triangle < words[slots]) {
+        slot = words[slots + 2u + triangle];
+    }
     if (slot == ABSENT) {
         return 0u;
     }

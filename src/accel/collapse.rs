@@ -18,11 +18,14 @@ pub(crate) struct Leaves {
     pub(crate) block: f32,
     /// and each of its triangles this; a node costs about 4.
     pub(crate) triangle: f32,
+    /// Whether they are split as long as their node has room: where each triangle is tested by itself, boxes that are tested
+    /// anyway keep rays from it.
+    pub(crate) fill: bool,
 }
 
 impl Leaves {
     /// Of trees whose leaves' triangles are tested all at once.
-    pub(crate) const BLOCKS: Self = Self { most: WIDTH, block: 1.0, triangle: 0.0 };
+    pub(crate) const BLOCKS: Self = Self { most: WIDTH, block: 1.0, triangle: 0.0, fill: false };
 }
 
 /// The shape of a wide tree.
@@ -67,7 +70,7 @@ impl Shape {
             let expanded: Vec<([Subtree; WIDTH], usize)> = level
                 .par_iter()
                 .with_min_len(256)
-                .map(|s| expand(*s, binary, leaves.most, &subtree))
+                .map(|s| expand(*s, binary, leaves, &subtree))
                 .collect();
             let first = shape.children.len();
             shape.levels.push(first..first + level.len());
@@ -116,32 +119,42 @@ fn is_leaf(binary: &Binary, leaves: Leaves) -> Vec<bool> {
 fn expand(
     s: Subtree,
     binary: &Binary,
-    leaf_most: usize,
+    leaves: Leaves,
     subtree: &impl Fn(u32) -> Subtree,
 ) -> ([Subtree; WIDTH], usize) {
-    let Some(root) = s.node else { return split_by_number(s, leaf_most) };
+    let Some(root) = s.node else { return split_by_number(s, leaves.most) };
     let mut children = [s; WIDTH];
     let mut count = 1;
-    if s.is_leaf {
+    if s.is_leaf && !leaves.fill {
         return (children, count);
     }
     let mut areas = [binary.nodes[root as usize].half_area; WIDTH];
     while count < WIDTH {
         let mut largest = None;
         for i in 0..count {
-            if !children[i].is_leaf && largest.is_none_or(|l: usize| areas[i] > areas[l]) {
+            let can_open = !children[i].is_leaf || leaves.fill && child_of(&children[i], binary) != 0;
+            let rank = |i: usize| (!children[i].is_leaf, areas[i]);
+            if can_open && largest.is_none_or(|l: usize| rank(i) > rank(l)) {
                 largest = Some(i);
             }
         }
-        let Some((open, node)) = largest.and_then(|i| children[i].node.map(|n| (i, n))) else { break };
-        let child = binary.nodes[node as usize].child;
+        let Some(open) = largest else { break };
+        let child = child_of(&children[open], binary);
+        // what is in a leaf stays in leaves
+        let was_leaf = children[open].is_leaf;
         for (place, c) in [(open, child), (count, child + 1)] {
             children[place] = subtree(c);
+            children[place].is_leaf |= was_leaf;
             areas[place] = binary.nodes[c as usize].half_area;
         }
         count += 1;
     }
     (children, count)
+}
+
+/// The first child of a subtree's root in the binary tree; 0 where it has none.
+fn child_of(s: &Subtree, binary: &Binary) -> u32 {
+    s.node.map_or(0, |node| binary.nodes[node as usize].child)
 }
 
 fn split_by_number(s: Subtree, leaf_most: usize) -> ([Subtree; WIDTH], usize) {

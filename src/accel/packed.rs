@@ -58,7 +58,8 @@ impl PackedTree {
     /// Builds over an indexed mesh in the current rayon pool. The same for any number of threads.
     pub fn build(positions: &[[f32; 3]], triangles: &[[u32; 3]], quality: Quality) -> Self {
         let binary = Binary::build(positions, triangles, quality);
-        let shape = Shape::collapse(&binary, Leaves { most: LEAF_MOST, block: 0.0, triangle: 0.3 });
+        let leaves = Leaves { most: LEAF_MOST, block: 0.0, triangle: 0.3, fill: true };
+        let shape = Shape::collapse(&binary, leaves);
         let boxes = boxes(&shape, |triangle| {
             Aabb::of_points(&triangles[triangle as usize].map(|i| positions[i as usize]))
         });

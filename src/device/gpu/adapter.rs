@@ -4,7 +4,7 @@ use crate::device::DeviceError;
 use std::sync::{Arc, Mutex, PoisonError};
 
 /// Storage buffers that the kernels bind at once.
-const STORAGE_BUFFERS: u32 = 14;
+const STORAGE_BUFFERS: u32 = 16;
 /// Threads of the largest workgroup, and bytes that they share.
 pub(super) const GROUP_THREADS: u32 = 256;
 const GROUP_BYTES: u32 = 10_240;

@@ -55,8 +55,7 @@ impl Arena {
         self.bytes.resize(self.bytes.len().next_multiple_of(4), 0);
         let needed = self.bytes.len() as u64;
         if buffer.as_ref().is_none_or(|b| b.size() < needed) {
-            let usage =
-                wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST;
+            let usage = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST;
             *buffer = Some(gpu.buffer("frame", needed.next_power_of_two().max(1 << 16), usage)?);
         }
         gpu.queue.write_buffer(buffer.as_ref()?, 0, &self.bytes);

@@ -6,11 +6,44 @@ use std::ops::Range;
 /// Threads of a workgroup that traces.
 pub(super) const GROUP: u32 = 64;
 
+/// Threads that take one pixel's samples side by side at most.
+pub(super) const LANES_MOST: u32 = 16;
+
 /// Rows of the picture that one dispatch traces.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct Cut {
     pub(super) rows: Range<u32>,
     pub(super) groups: [u32; 2],
+}
+
+/// Samples of one dispatch at most while nothing is known of how long they take: the slowest GPUs take a tenth of a second
+/// for them.
+const SAMPLES_UNKNOWN: u64 = 1 << 22;
+/// Of frames with rays that branch so many times fewer.
+const BRANCHING: u64 = 8;
+/// How long a dispatch should take at most, ms.
+const DISPATCH_MS: f64 = 10.0;
+/// Samples of one dispatch at most: the next frame may be a hundred times harder than the last one.
+const SAMPLES_MOST: u64 = 1 << 25;
+
+/// How fast a device traces, from the frame before.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Pace {
+    samples_per_ms: Option<f64>,
+}
+
+impl Pace {
+    /// Learns from a frame of so many samples.
+    pub(super) fn learn(&mut self, samples: u64, ms: f64) {
+        self.samples_per_ms = (ms > 0.0).then(|| samples as f64 / ms);
+    }
+
+    /// Samples of a dispatch of the next frame at most.
+    pub(super) fn samples_most(self, has_branches: bool) -> u64 {
+        let unknown = if has_branches { SAMPLES_UNKNOWN / BRANCHING } else { SAMPLES_UNKNOWN };
+        let known = self.samples_per_ms.map_or(0, |rate| (rate * DISPATCH_MS) as u64);
+        known.clamp(unknown, SAMPLES_MOST)
+    }
 }
 
 /// The pixels of a workgroup where so many threads share one: a tile of so many columns and rows.

@@ -3,7 +3,7 @@
 
 use super::adapter::Gpu;
 use super::arena::{Arena, Section};
-use super::cuts::{Cut, GROUP, cuts, tile};
+use super::cuts::{Cut, GROUP, LANES_MOST, Pace, cuts, tile};
 use super::film::{COUNTERS, Facts, INSTANTS, Layout, take_out};
 use super::fits::{Fits, groups, is_top};
 use super::pipelines::{Kernel, Pipelines};
@@ -19,10 +19,6 @@ use std::ops::Range;
 
 /// Frames under way at most: one is read back, one traced, one prepared.
 pub(super) const SLOTS: usize = 3;
-/// Samples of one dispatch at most: the slowest GPUs take a tenth of a second for them.
-const SAMPLES_MOST: u64 = 1 << 22;
-/// Of frames with rays that branch so many times fewer.
-const BRANCHING: u64 = 8;
 /// Bytes of waiting rays at most.
 const WAITING_BYTES: u64 = 1 << 29;
 
@@ -37,6 +33,7 @@ pub(super) struct Buffers {
     costs: Option<wgpu::Buffer>,
     instants: Option<(wgpu::QuerySet, wgpu::Buffer)>,
     slots: [Slot; SLOTS],
+    pub(super) pace: Pace,
     /// The slot of the next frame.
     next: usize,
 }
@@ -60,6 +57,13 @@ pub(super) struct Begun {
     submission: wgpu::SubmissionIndex,
     /// The trees that are fitted.
     pub(super) fits: Vec<FitOf>,
+}
+
+impl Begun {
+    /// Samples of the picture.
+    pub(super) fn samples(&self) -> u64 {
+        self.shot.size.iter().map(|&n| u64::from(n)).product::<u64>() * u64::from(self.shot.samples)
+    }
 }
 
 /// What a frame's dispatches are made with.
@@ -107,14 +111,15 @@ impl Ground<'_> {
         stop: &Stop,
     ) -> Result<Begun, DeviceError> {
         let layout = Layout::new(shot, output, records.has.albedo, fits.trees.len() as u64);
-        let lanes = shot.samples.next_power_of_two().min(16);
+        let lanes = shot.samples.next_power_of_two().min(LANES_MOST);
         // shaders/parts/branch.wgsl says why these are enough
         let waiting_each = if records.has.branches { shot.depth.max(1) } else { 0 };
         let (slices, waiting_bytes) = self.slices(records, shot, lanes, waiting_each);
         let center_slices = if layout.center.is_empty() {
             Vec::new()
         } else {
-            cuts(shot.size, tile(1), SAMPLES_MOST / u64::from(shot.size[0]))
+            let samples = self.buffers.pace.samples_most(records.has.branches);
+            cuts(shot.size, tile(1), samples / u64::from(shot.size[0]))
         };
         self.room_for_fits(fits)?;
         let slot = self.room_for_frame(&layout, waiting_bytes)?;
@@ -228,7 +233,7 @@ impl Ground<'_> {
     /// How the picture is cut, and the bytes that waiting rays take in one cut.
     fn slices(&self, records: &Records, shot: &Shot, lanes: u32, waiting_each: u32) -> (Vec<Cut>, u64) {
         let [columns, rows] = tile(lanes);
-        let samples = if records.has.branches { SAMPLES_MOST / BRANCHING } else { SAMPLES_MOST };
+        let samples = self.buffers.pace.samples_most(records.has.branches);
         let mut rows_most = samples / (u64::from(shot.size[0]) * u64::from(shot.samples)).max(1);
         let threads_of_tiles = u64::from(shot.size[0].div_ceil(columns) * GROUP);
         let bytes_each = u64::from(waiting_each) * WAITING_ROWS * 16;

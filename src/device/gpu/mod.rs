@@ -214,6 +214,8 @@ impl GpuDevice {
             ticks.map(|ticks| ticks as f64 * f64::from(open.gpu.queue.get_timestamp_period()) * 1e-6)
         };
         let trace_ms = ms(2, 3).unwrap_or_else(|| start.ms());
+        let samples = begun.samples();
+        open.buffers.pace.learn(samples, trace_ms);
         let update_ms = if begun.fits.is_empty() { None } else { ms(0, 1) };
         Ok(Traced { film, rays: facts.rays, trace_ms, update_ms, readback_ms: Some(readback_ms) })
     }

@@ -2,6 +2,7 @@
 
 use crate::accel::{Aabb, PackedNode};
 use crate::scene::{Geometry, PartHash, Texels, Texture, Triangles};
+use super::records::ABSENT;
 use rayon::ThreadPool;
 use rayon::prelude::*;
 
@@ -25,17 +26,26 @@ pub(super) fn move_nodes(nodes: &mut [PackedNode], first_node: u32, first_triang
     }
 }
 
-/// The words of a part that kernels read.
-pub(super) fn words(part: PartHash, geometry: &Geometry) -> Option<&[u8]> {
-    let Geometry { positions, triangles, texcoords, normals, colors, material_runs, .. } = geometry;
+/// The slots of triangles: the first triangle of the last slot, that slot, then the slots of the triangles before it, so that
+/// it does not depend on how many follow. Takes no more than the faces, which a GPU does not hold.
+pub(super) fn triangle_slots(runs: &[[u32; 2]]) -> Vec<u32> {
+    let Some(&[last_first, last_slot]) = runs.last() else { return Vec::new() };
+    let mut words = vec![ABSENT; 2 + last_first as usize];
+    (words[0], words[1]) = (last_first, last_slot);
+    for (&[first, slot], &[next, _]) in runs.iter().zip(&runs[1..]) {
+        words[2 + first as usize..2 + next as usize].fill(slot);
+    }
+    words
+}
+
+/// The words of a part that kernels read as it stands.
+pub(super) fn words(part: PartHash, geometry: &Geometry) -> Option<&[u32]> {
+    let Geometry { positions, triangles, texcoords, normals, colors, .. } = geometry;
     if part == positions.hash() {
         return Some(bytemuck::cast_slice(&positions.0));
     }
     if part == triangles.hash() {
         return Some(bytemuck::cast_slice(&triangles.0));
-    }
-    if part == material_runs.hash() {
-        return Some(bytemuck::cast_slice(&material_runs.0));
     }
     if let Some(a) = texcoords {
         if part == a.values.hash() {

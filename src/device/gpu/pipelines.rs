@@ -87,7 +87,7 @@ impl Pipelines {
     }
 }
 
-fn constants(has: Has) -> [(&'static str, f64); 9] {
+fn constants(has: Has) -> [(&'static str, f64); 10] {
     let flags = [
         has.single_tree,
         has.branches,
@@ -97,8 +97,9 @@ fn constants(has: Has) -> [(&'static str, f64); 9] {
         has.goes_on,
         has.albedo,
         has.one_light,
+        has.one_ray,
     ];
-    let mut constants = [(shaders::FILM_WORDS, f64::from(has.film_words)); 9];
+    let mut constants = [(shaders::FILM_WORDS, f64::from(has.film_words)); 10];
     for ((constant, name), is_set) in constants.iter_mut().zip(shaders::FLAGS).zip(flags) {
         *constant = (name, f64::from(u8::from(is_set)));
     }
@@ -109,7 +110,6 @@ fn constants(has: Has) -> [(&'static str, f64); 9] {
 fn layout(gpu: &Gpu, label: &str, bindings: &[Access], with_offset: usize) -> wgpu::BindGroupLayout {
     let entry = |(binding, access): (usize, &Access)| {
         let ty = match access {
-            Access::Uniform => wgpu::BufferBindingType::Uniform,
             Access::Read => wgpu::BufferBindingType::Storage { read_only: true },
             Access::Write => wgpu::BufferBindingType::Storage { read_only: false },
         };

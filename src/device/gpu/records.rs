@@ -120,8 +120,7 @@ pub struct ObjectRecord {
     pub first_part: u32,
     pub meshes: u32,
     pub mesh_count: u32,
-    pub runs: u32,
-    pub run_count: u32,
+    pub triangle_slots: u32,
     pub slots: u32,
     pub corners: u32,
     pub colors: u32,
@@ -129,7 +128,9 @@ pub struct ObjectRecord {
     pub normal_corners: u32,
     pub texcoords: u32,
     pub texcoord_corners: u32,
-    pub pad: [u32; 2],
+    pub pad_a: u32,
+    pub pad_b: u32,
+    pub pad_c: u32,
 }
 
 /// In [`ObjectRecord::flags`]: it has a transform.

@@ -2,7 +2,7 @@
 
 use super::adapter::Gpu;
 use super::heap::{Full, Heap};
-use super::parts::{move_nodes, texels, vertices, words};
+use super::parts::{move_nodes, texels, triangle_slots, vertices, words};
 use super::records::{ABSENT, RefitTree};
 use crate::accel::{NODE_BYTES, PackedTree, Quality, TRIANGLE_BYTES};
 use crate::clock::Stopwatch;
@@ -223,9 +223,18 @@ impl Resident {
             self.heaps.texels.write(means.gpu, place.start, bytes);
             return Ok(Place::Texels(place));
         }
-        let Some(bytes) = words(part, geometry) else { return Ok(Place::Host) };
-        let place = self.take(means, |heaps| &mut heaps.words, bytes.len() as u64 / 4)?;
-        self.heaps.words.write(means.gpu, place.start, bytes);
+        let slots;
+        let words = if part == geometry.material_runs.hash() {
+            slots = triangle_slots(&geometry.material_runs.0);
+            &slots
+        } else {
+            match words(part, geometry) {
+                Some(words) => words,
+                None => return Ok(Place::Host),
+            }
+        };
+        let place = self.take(means, |heaps| &mut heaps.words, words.len() as u64)?;
+        self.heaps.words.write(means.gpu, place.start, bytemuck::cast_slice(words));
         Ok(Place::Words(place))
     }
 
@@ -421,8 +430,8 @@ fn refuse_beyond_bindings(frame: &Frame, means: &Means) -> Result<(), DeviceErro
             triangles += geometry.triangles.0.len() as u64;
         }
     }
-    // by triangle: its vertices and number, and a share of the lists of nodes
-    let largest = [triangles * TRIANGLE_BYTES, words_bytes + triangles * 20, texels_bytes].into_iter().max();
+    // by triangle: its vertices and number, its slot, and a share of the lists of nodes
+    let largest = [triangles * TRIANGLE_BYTES, words_bytes + triangles * 24, texels_bytes].into_iter().max();
     match largest {
         Some(bytes) if bytes > means.gpu.binding_bytes => {
             Err(means.out_of_memory(bytes, means.gpu.binding_bytes))

@@ -4,6 +4,7 @@ use super::records::{
     ABSENT, EmitterRecord, MAP_ALPHA_VARIES, MAP_CLAMP, MAP_FLOAT, MAP_SRGB, MATERIAL_MAPS, MIRRORED,
     MapRecord, ObjectRecord, PLACED, ShotConstants,
 };
+use super::cuts::LANES_MOST;
 use super::resident::Resident;
 use super::shaders::far;
 use crate::accel::{Aabb, PackedNode, PackedTop, Placement};
@@ -34,6 +35,8 @@ pub(super) struct Has {
     pub(super) goes_on: bool,
     pub(super) albedo: bool,
     pub(super) one_light: bool,
+    /// Whether a thread takes one sample at most, of a path that ends at its first surface.
+    pub(super) one_ray: bool,
     /// Entries of stacks in threads' own memory.
     pub(super) far: u32,
     /// Words of the film for each pixel.
@@ -192,13 +195,15 @@ fn has(world: &World, shot: &Shot, lights: &[LightRecord], has_picture: bool, is
         m.cover() < 1.0 || m.is(HALO) || textures(material).is_some_and(|t| t.map_d.is_some())
     };
     let reflects = |(material, _)| textures(material).is_some_and(|t| t.refl.is_some());
+    let goes_on = all().any(lets_through);
     Has {
         single_tree: is_single,
         branches: world.has_models_beyond_2,
+        one_ray: shot.samples <= LANES_MOST && !world.has_models_beyond_2 && !goes_on,
         textures: has_picture || all().any(|(_, m)| m.is(TEXTURED)) || all().any(reflects),
         area_light: lights.iter().any(|l| l.kind == AREA),
         transparency: !world.is_opaque,
-        goes_on: all().any(lets_through),
+        goes_on,
         albedo: shot.aovs.contains(Aov::Albedo),
         one_light: lights.len() == 1 && lights[0].kind != AREA,
         film_words: 0,
@@ -234,8 +239,7 @@ fn lists(
 /// Where an object's parts are; None where one is not there.
 fn places(record: &mut ObjectRecord, geometry: &Geometry, resident: &Resident) -> Option<()> {
     let of = |part: Option<PartHash>| part.map_or(Some(ABSENT), |part| resident.words_of(part));
-    record.runs = of(Some(geometry.material_runs.hash()))?;
-    record.run_count = geometry.material_runs.0.len() as u32;
+    record.triangle_slots = of((!geometry.material_runs.0.is_empty()).then(|| geometry.material_runs.hash()))?;
     record.corners = of(Some(geometry.triangles.hash()))?;
     record.colors = of(geometry.colors.as_ref().map(Part::hash))?;
     record.normals = of(geometry.normals.as_ref().map(|a| a.values.hash()))?;

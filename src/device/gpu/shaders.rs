@@ -9,24 +9,22 @@ macro_rules! part {
 /// How a kernel has a buffer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Access {
-    /// One record.
-    Uniform,
-    /// A list that is only read.
+    /// It only reads it.
     Read,
-    /// A list that is written to.
+    /// It writes to it.
     Write,
 }
 
-use Access::{Read, Uniform, Write};
+use Access::{Read, Write};
 
 /// The bindings of kernels that trace, from 0 on: all of group 0.
 pub const TRACE_BINDINGS: [Access; 16] =
-    [Uniform, Uniform, Read, Read, Read, Read, Read, Read, Read, Read, Read, Read, Read, Write, Write, Write];
+    [Read, Read, Read, Read, Read, Read, Read, Read, Read, Read, Read, Read, Read, Write, Write, Write];
 /// The bindings of kernels that fit trees, from 0 on: all of group 0.
-pub const REFIT_BINDINGS: [Access; 8] = [Uniform, Read, Read, Write, Write, Write, Write, Read];
+pub const REFIT_BINDINGS: [Access; 8] = [Read, Read, Read, Write, Write, Write, Write, Read];
 
 /// The constants of kernels that trace which say whether a frame has something.
-pub const FLAGS: [&str; 8] = [
+pub const FLAGS: [&str; 9] = [
     "SINGLE_TREE",
     "HAS_BRANCHES",
     "HAS_TEXTURES",
@@ -35,6 +33,7 @@ pub const FLAGS: [&str; 8] = [
     "GOES_ON",
     "HAS_ALBEDO",
     "HAS_ONE_LIGHT",
+    "HAS_ONE_RAY",
 ];
 /// The constant of kernels that trace which says how many words a pixel has: 1, 3 or 4.
 pub const FILM_WORDS: &str = "FILM_WORDS";
@@ -71,10 +70,10 @@ const TRACING: &[&str] = &[
 ];
 
 /// Entries of a thread's stack that are in the workgroup's memory: `NEAR` in shaders/parts/traverse.wgsl.
-const NEAR: usize = 6;
+const NEAR: usize = 2;
 /// Numbers of further entries for which there are kernels: of their own memory threads clear all before they begin, which for
 /// the largest takes as long as a tenth of tracing. The last is enough for all trees.
-pub const FARS: [u32; 4] = [2, 8, 20, 44];
+pub const FARS: [u32; 4] = [6, 12, 24, 48];
 
 /// The least of [`FARS`] for rays through trees of so many levels, below a top level of so many (0: there is none). A ray leaves
 /// one group of children for each level that it goes down; where an object is entered, its siblings and what stands in the
@@ -91,7 +90,7 @@ pub fn trace(far: u32) -> String {
 }
 
 fn with_far(text: &str, far: u32) -> String {
-    text.replace("const FAR: u32 = 44u;", &format!("const FAR: u32 = {far}u;"))
+    text.replace("const FAR: u32 = 48u;", &format!("const FAR: u32 = {far}u;"))
 }
 
 /// The kernel that makes auxiliary pictures of the rays through pixels' centres.
