@@ -14,11 +14,12 @@ use rentix::device::gpu::{Adapter, GpuDevice, adapters};
 use rentix::device::{Device, DeviceError, DeviceInfo, Output, Stop, Traced, UpdateCost, conformance};
 use rentix::film::Film;
 use rentix::film::quantize::quantize8;
+use rentix::format::{ReadOptions, TextureCache, load_obj};
 use rentix::job::{Options, Request, resolve};
 use rentix::math::{DVec3, Vec3};
 use rentix::plan::{Action, Residency, Update, UpdatePlan, Wishes, plan_frame};
 use rentix::run::{RunOptions, render};
-use rentix::scene::{AovSet, Background, Filter, Frame, Material, Object, Shot};
+use rentix::scene::{AovSet, Background, Camera, Filter, Frame, Material, Object, Shot};
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::Arc;
@@ -99,8 +100,27 @@ fn gpus_show_what_the_cpu_shows() {
     }
 }
 
-/// From inside of a closed surface no background is seen, wherever it stands. The surface is turned, not the camera:
-/// drivers of Mesa that are programs compile kernels anew for each camera.
+/// At a size at which most of a surface has no edge nearby.
+#[test]
+fn gpus_show_surfaces_as_the_cpu_does_block_by_block() {
+    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("sequences/inchworm/inchworm_0009.obj");
+    let loaded = load_obj(&file, &ReadOptions::default(), &TextureCache::default()).unwrap();
+    let points = loaded.geometry.positions.0.iter().map(|&p| Vec3::from(p).as_dvec3());
+    let low = points.clone().fold(DVec3::INFINITY, DVec3::min);
+    let high = points.fold(DVec3::NEG_INFINITY, DVec3::max);
+    let (look_at, diagonal) = ((low + high) * 0.5, (high - low).length());
+    let mut shot = scenes::shot([320, 180], 2);
+    shot.camera = Camera { eye: look_at + DVec3::new(0.2, 0.3, 0.8) * diagonal, look_at, ..shot.camera };
+    let frame = Frame { objects: vec![Object { geometry: loaded.geometry, transform: None }] };
+    let mut cpu = CpuDevice::new(2, BUDGET_BYTES).unwrap();
+    let right = picture(&mut cpu, &frame, &shot);
+    for adapter in usable() {
+        let film = picture(&mut open(&adapter), &frame, &shot);
+        Agreement::new(&right, &film).check_blocks(&adapter.name());
+    }
+}
+
+/// From inside of a closed surface no background is seen, wherever it stands and however it is turned.
 #[test]
 fn no_ray_leaks_on_a_gpu() {
     const PLACES: [(f64, DVec3); 5] = [

@@ -67,11 +67,8 @@ impl Shape {
                     s.node = None;
                 }
             }
-            let expanded: Vec<([Subtree; WIDTH], usize)> = level
-                .par_iter()
-                .with_min_len(256)
-                .map(|s| expand(*s, binary, leaves, &subtree))
-                .collect();
+            let expanded: Vec<([Subtree; WIDTH], usize)> =
+                level.par_iter().with_min_len(256).map(|s| expand(*s, binary, leaves, &subtree)).collect();
             let first = shape.children.len();
             shape.levels.push(first..first + level.len());
             let mut next_node = first + level.len();

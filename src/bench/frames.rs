@@ -25,7 +25,7 @@ const FRAMES: usize = 120;
 /// How long frames are rendered before those that are measured, ms: clocks rise.
 const WARM_MS: f64 = 400.0;
 /// Around and from pole to pole: of the peer's sphere, 147,456 triangles, and of one of 1,048,576.
-const SPHERE: [u32; 2] = [384, 192];
+pub(super) const SPHERE: [u32; 2] = [384, 192];
 const LARGE_SPHERE: [u32; 2] = [1024, 512];
 
 /// Sizes of pictures, and samples a pixel.
@@ -33,7 +33,7 @@ const SHOTS: [([u32; 2], u32); 4] =
     [([1280, 720], 1), ([1920, 1080], 1), ([1280, 720], 16), ([1920, 1080], 16)];
 
 #[allow(clippy::needless_pass_by_value, reason = "it stands where errors are mapped")]
-fn failed(error: DeviceError) -> BenchError {
+pub(super) fn failed(error: DeviceError) -> BenchError {
     BenchError::Frame(error.to_string())
 }
 
@@ -215,7 +215,7 @@ impl Ran {
         is_measured: bool,
     ) -> Result<(), BenchError> {
         let upload_ms = uploads.pop_front().flatten();
-        let Traced { film, rays, trace_ms, update_ms, readback_ms } = device.finish().map_err(failed)?;
+        let Traced { film, rays, trace_ms, update_ms, readback_ms, .. } = device.finish().map_err(failed)?;
         std::hint::black_box(film);
         if is_measured {
             self.rays = rays.camera + rays.shadow;
@@ -229,7 +229,7 @@ impl Ran {
 }
 
 /// The sphere of the peer's script in all its poses.
-fn poses([around, down]: [u32; 2]) -> Vec<Frame> {
+pub(super) fn poses([around, down]: [u32; 2]) -> Vec<Frame> {
     let point = |i: u32, j: u32| {
         let (v, u) = (PI * i as f32 / down as f32, 2.0 * PI * j as f32 / around as f32);
         [libm::sinf(v) * libm::cosf(u), libm::cosf(v), libm::sinf(v) * libm::sinf(u)]
@@ -287,7 +287,7 @@ fn lamp(position: Vec3) -> Light {
 }
 
 /// The camera and light of the peer's script.
-fn sphere_shot(frame: &Frame, size: [u32; 2], samples: u32) -> Shot {
+pub(super) fn sphere_shot(frame: &Frame, size: [u32; 2], samples: u32) -> Shot {
     let (middle, diagonal) = extent(&frame.objects[0].geometry);
     Shot {
         camera: Camera {

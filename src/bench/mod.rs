@@ -10,6 +10,7 @@ mod reading;
 pub mod sequences;
 mod start;
 mod table;
+mod timeline;
 mod times;
 mod trees;
 mod updates;
@@ -30,6 +31,7 @@ use std::fs::create_dir_all;
 use std::io;
 use std::path::{Path, PathBuf};
 use tempfile::TempDir;
+use timeline::Timeline;
 use view::View;
 
 /// What is asked for.
@@ -70,7 +72,7 @@ pub struct Workload {
 /// All of them.
 pub const WORKLOADS: [Workload; 1] = [Workload {
     name: "updates",
-    tables: &["reading", "trees", "warm", "start", "policy", "frames", "refit", "rays"],
+    tables: &["reading", "trees", "warm", "start", "policy", "frames", "timeline", "refit", "rays"],
     about: "what a frame costs that follows another: reading, trees, refit or rebuild, the store, devices",
     run: updates::updates,
 }];
@@ -118,6 +120,7 @@ pub enum BenchError {
 struct Findings {
     tables: Vec<Table>,
     charts: Vec<Chart>,
+    timelines: Vec<Timeline>,
 }
 
 impl Findings {
@@ -186,9 +189,11 @@ pub fn bench(
         });
         let json = serde_json::to_vec_pretty(&json).unwrap_or_default();
         write_atomic(&folder.join(format!("{}.json", workload.name)), &json)?;
-        for chart in &found.charts {
-            let svg = chart.svg().map_err(BenchError::Chart)?;
-            write_atomic(&folder.join(format!("{}.svg", chart.name)), svg.as_bytes())?;
+        let charts = found.charts.iter().map(|chart| (&chart.name, chart.svg()));
+        let timelines = found.timelines.iter().map(|timeline| (&timeline.name, timeline.svg()));
+        for (name, svg) in charts.chain(timelines) {
+            let svg = svg.map_err(BenchError::Chart)?;
+            write_atomic(&folder.join(format!("{name}.svg")), svg.as_bytes())?;
         }
     }
     Ok(())

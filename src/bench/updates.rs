@@ -6,6 +6,7 @@ use super::policy::{Input, policy};
 use super::reading::{Consecutive, RATE, reading};
 use super::sequences::{HOSTILE, write_wave};
 use super::start::starts;
+use super::timeline::timeline;
 use super::trees::{EMBREE_REFIT_1, Mesh, trees};
 use super::view::View;
 use super::warm::{WarmPeers, warm_frames};
@@ -75,7 +76,7 @@ pub(super) fn updates(bench: &Bench, on_event: &mut dyn FnMut(&Event<'_>)) -> Re
         on_event(&Event::Stage("start"));
         findings.add(starts(bench, &[("sibenik", &sibenik, SIBENIK)])?, on_event);
     }
-    if ["frames", "refit", "rays"].iter().any(|table| bench.wants(table)) {
+    if ["frames", "timeline", "refit", "rays"].iter().any(|table| bench.wants(table)) {
         devices(bench, &hostile, &mut findings, on_event)?;
     }
     if bench.wants("policy") {
@@ -108,6 +109,13 @@ fn devices(
     if bench.wants("frames") {
         on_event(&Event::Stage("frames of a device"));
         findings.add(frames(bench, &mut *device)?, on_event);
+    }
+    if bench.wants("timeline") {
+        on_event(&Event::Stage("frames over time"));
+        if let Some((table, chart)) = timeline(bench, &mut *device)? {
+            findings.add(table, on_event);
+            findings.timelines.push(chart);
+        }
     }
     if bench.wants("refit") {
         on_event(&Event::Stage("fits on a device"));

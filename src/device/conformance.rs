@@ -179,8 +179,11 @@ fn what_does_not_fit_is_refused(make: Make) {
 
 fn a_frame_without_objects_is_background(make: Make) {
     let film = picture(&mut *make(AMPLE_BYTES), &Frame::default());
-    let background = BACKGROUND.to_array();
-    assert!(film.rgb.iter().all(|p| *p == background), "an empty frame does not show the background");
+    // a mean of three equal samples may be off by a GPU's division
+    let is_background = |p: &[f32; 3]| {
+        p.iter().zip(BACKGROUND.to_array()).all(|(x, b)| (x - b).abs() <= 4.0 * f32::EPSILON * b)
+    };
+    assert!(film.rgb.iter().all(is_background), "an empty frame does not show the background");
     assert!(film.aovs.id.is_none_or(|ids| ids.iter().all(|id| *id == [u32::MAX; 2])));
 }
 

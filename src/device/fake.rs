@@ -1,7 +1,9 @@
 //! The fake device: keeps its residency as a real one does, draws a film that tells which frame it is, and fails as it
 //! is told. For tests of what stands above devices.
 
-use super::{Device, DeviceError, DeviceInfo, DeviceKind, Output, RayCounts, Stop, Traced, UpdateCost};
+use super::{
+    Device, DeviceError, DeviceInfo, DeviceKind, Output, RayCounts, Spans, Stop, Traced, UpdateCost,
+};
 use crate::film::Film;
 use crate::plan::{Residency, Step, TREE_BYTES_PER_TRIANGLE, TreeState, UpdatePlan, tree_name};
 use crate::scene::{Background, Frame, Object, PartHash, Shot};
@@ -144,6 +146,7 @@ impl Device for FakeDevice {
             trace_ms: 0.0,
             update_ms: None,
             readback_ms: None,
+            spans: Spans::default(),
         });
         Ok(())
     }

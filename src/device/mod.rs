@@ -126,6 +126,17 @@ pub struct Traced {
     pub update_ms: Option<f64>,
     /// Bringing the film back, ms; None where it need not be.
     pub readback_ms: Option<f64>,
+    /// When it fitted trees and when it traced, by its own clock; where it has one.
+    pub spans: Spans,
+}
+
+/// When a device worked on a frame: from and to, ms of its own clock.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Spans {
+    /// Fitting trees.
+    pub update: Option<[f64; 2]>,
+    /// Tracing.
+    pub trace: Option<[f64; 2]>,
 }
 
 /// Why a device did not do what it was asked.

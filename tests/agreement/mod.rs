@@ -11,8 +11,16 @@ const PIXELS_FOR_ANOTHER_HIT: usize = 2000;
 const SAME_DISTANCE: f32 = 1e-5;
 /// Where the distance jumps by more than this part there is a silhouette.
 const JUMP: f32 = 0.01;
+/// In a small picture it jumps by more than that along a floor; by this it does not.
+const LARGE_JUMP: f32 = 0.1;
 /// Mean FLIP must be less.
 const FLIP: f64 = 0.005;
+/// Side of the blocks whose means are compared, pixels.
+const BLOCK: usize = 8;
+/// A block's mean may be off by this, of what is shown.
+const BLOCK_OFF: f32 = 4.0 / 255.0;
+/// Where neighbours differ by more than this in what is shown, there is the edge of a shadow or of a texel.
+const EDGE: f32 = 16.0 / 255.0;
 
 /// What two films differ in.
 #[derive(Clone, Debug)]
@@ -25,6 +33,12 @@ pub struct Agreement {
     pub without_silhouette: Vec<[usize; 2]>,
     /// Mean FLIP.
     pub flip: f64,
+    /// Blocks with a surface, those of them without silhouette or edge, and those of these whose mean is off.
+    pub covered_blocks: usize,
+    /// See `covered_blocks`.
+    pub judged_blocks: usize,
+    /// See `covered_blocks`: their upper left pixels.
+    pub blocks_off: Vec<[usize; 2]>,
 }
 
 impl Agreement {
@@ -43,29 +57,64 @@ impl Agreement {
             let rows = y.saturating_sub(1)..(y + 2).min(height);
             rows.flat_map(move |y| (x.saturating_sub(1)..(x + 2).min(width)).map(move |x| [x, y]))
         };
-        let is_silhouette = |at: [usize; 2]| {
+        let jumps = |at: [usize; 2], jump: f32| {
             let p = at[1] * width + at[0];
             around(at).any(|[x, y]| {
                 let q = y * width + x;
                 let (s, t) = (depths[p], depths[q]);
-                ids[p][0] != ids[q][0] || (s != t && (s - t).abs() > JUMP * s.min(t))
+                ids[p][0] != ids[q][0] || (s != t && (s - t).abs() > jump * s.min(t))
             })
         };
+        let is_silhouette = |at| jumps(at, JUMP);
         let others: Vec<[usize; 2]> =
             (0..width * height).filter(|p| !is_same(*p)).map(|p| [p % width, p / width]).collect();
         let comparison = compare(&picture(a), &picture(b)).unwrap();
+        let (shown, other_shown) = (shown(a), shown(b));
+        let is_edge = |at: [usize; 2]| {
+            let p = shown[at[1] * width + at[0]];
+            around(at).any(|[x, y]| (0..3).any(|k| (p[k] - shown[y * width + x][k]).abs() > EDGE))
+        };
+        let (mut covered_blocks, mut judged_blocks, mut blocks_off) = (0, 0, Vec::new());
+        for corner in (0..height).step_by(BLOCK).flat_map(|y| (0..width).step_by(BLOCK).map(move |x| [x, y]))
+        {
+            let [xs, ys] = [(corner[0], width), (corner[1], height)].map(|(c, end)| c..(c + BLOCK).min(end));
+            let block: Vec<[usize; 2]> = ys.flat_map(|y| xs.clone().map(move |x| [x, y])).collect();
+            let place = |&[x, y]: &[usize; 2]| y * width + x;
+            if !block.iter().any(|at| depths[place(at)].is_finite()) {
+                continue;
+            }
+            covered_blocks += 1;
+            if block.iter().any(|&at| jumps(at, LARGE_JUMP) || is_edge(at)) {
+                continue;
+            }
+            judged_blocks += 1;
+            let mean = |shown: &[[f32; 3]], k: usize| {
+                block.iter().map(|at| shown[place(at)][k]).sum::<f32>() / block.len() as f32
+            };
+            // also where one is not a number
+            let is_off = |k: usize| {
+                let off = (mean(&shown, k) - mean(&other_shown, k)).abs();
+                off.is_nan() || off > BLOCK_OFF
+            };
+            if (0..3).any(is_off) {
+                blocks_off.push(corner);
+            }
+        }
         Self {
             pixels: width * height,
             other_hits: others.len(),
             without_silhouette: others.into_iter().filter(|&at| !around(at).any(is_silhouette)).collect(),
             flip: comparison.flip,
+            covered_blocks,
+            judged_blocks,
+            blocks_off,
         }
     }
 
     /// Where they differ by more than they may.
     pub fn faults(&self) -> Vec<String> {
         let mut faults = Vec::new();
-        let Self { pixels, other_hits, without_silhouette, flip } = self;
+        let Self { pixels, other_hits, without_silhouette, flip, blocks_off, .. } = self;
         if other_hits * PIXELS_FOR_ANOTHER_HIT > *pixels {
             faults.push(format!("{other_hits} of {pixels} pixels have another hit"));
         }
@@ -76,7 +125,21 @@ impl Agreement {
         if flip.is_nan() || *flip >= FLIP {
             faults.push(format!("FLIP is {flip}"));
         }
+        if !blocks_off.is_empty() {
+            faults.push(format!("blocks of 8x8 pixels are off at {blocks_off:?}"));
+        }
         faults
+    }
+
+    /// As [`Self::check`]; and at least half of the blocks with a surface could be judged, which takes a picture of some size.
+    #[track_caller]
+    pub fn check_blocks(&self, what: &str) {
+        self.check(what);
+        let Self { covered_blocks, judged_blocks, .. } = self;
+        assert!(
+            2 * judged_blocks >= *covered_blocks,
+            "{what}: {judged_blocks} of {covered_blocks} have no edge"
+        );
     }
 
     /// Fails, naming what, where there is a fault.
@@ -85,6 +148,15 @@ impl Agreement {
         let faults = self.faults();
         assert!(faults.is_empty(), "{what}: {}", faults.join("; "));
     }
+}
+
+/// What is shown of a film: values on the sRGB curve.
+fn shown(film: &Film) -> Vec<[f32; 3]> {
+    let curve = |x: f32| {
+        let x = x.clamp(0.0, 1.0);
+        if x <= 0.003_130_8 { 12.92 * x } else { 1.055 * x.powf(1.0 / 2.4) - 0.055 }
+    };
+    film.rgb.iter().map(|p| p.map(curve)).collect()
 }
 
 /// The colour of a film.
@@ -134,4 +206,13 @@ fn agreement_on_paper() {
     assert!(away.without_silhouette == [[42, 7]] && fails(&away));
     assert!(fails(&of(&|f| hit(f, [9, 9], [0, 1], f32::NAN))), "what is not a number is no distance");
     assert!(fails(&of(&|f| f.rgb.iter_mut().for_each(|p| p[0] += 0.1))));
+    // 10 x 7 blocks; those of the walls' border, columns 32 to 47, have an edge
+    assert_eq!((same.covered_blocks, same.judged_blocks), (70, 56));
+    // one block off by 5/255 in its mean
+    let off = |by: f32| {
+        of(&move |f| (8..16).for_each(|y| (64..72).for_each(|x| f.rgb[80 * y + x] = [0.2 + by; 3])))
+    };
+    let code = 1.0 / 255.0 / 1.055 * 2.4 * 0.2_f32.powf(1.4 / 2.4);
+    assert!(off(3.5 * code).blocks_off.is_empty());
+    assert!(off(4.7 * code).blocks_off == [[64, 8]] && fails(&off(4.7 * code)));
 }

@@ -2,7 +2,7 @@
 
 use crate::accel::TracedScene;
 use crate::clock::Stopwatch;
-use crate::device::{DeviceError, RayCounts, Stop, Traced};
+use crate::device::{DeviceError, RayCounts, Spans, Stop, Traced};
 use crate::film::Film;
 use crate::kernel::{FilmBand, Scene, TileBuffers, bands, trace_tile};
 use crate::scene::{Frame, Shot};
@@ -31,7 +31,14 @@ pub(super) fn trace(
             Some(sum)
         })
         .ok_or(DeviceError::Stopped)?;
-    Ok(Traced { film, rays, trace_ms: start.ms(), update_ms: None, readback_ms: None })
+    Ok(Traced {
+        film,
+        rays,
+        trace_ms: start.ms(),
+        update_ms: None,
+        readback_ms: None,
+        spans: Spans::default(),
+    })
 }
 
 /// Tile after tile; None where it was stopped.

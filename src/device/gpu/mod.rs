@@ -17,7 +17,7 @@ pub mod shaders;
 
 pub use adapter::{Adapter, adapters};
 
-use super::{Device, DeviceError, DeviceInfo, DeviceKind, Output, Stop, Traced, UpdateCost};
+use super::{Device, DeviceError, DeviceInfo, DeviceKind, Output, Spans, Stop, Traced, UpdateCost};
 use crate::accel::{Aabb, PackedNode};
 use crate::clock::Stopwatch;
 use crate::plan::{Residency, UpdatePlan};
@@ -208,16 +208,23 @@ impl GpuDevice {
         for (of, cost) in begun.fits.iter().zip(&facts.costs) {
             open.resident.fitted(*of, *cost);
         }
-        let ms = |from: usize, to: usize| {
-            let ticks =
-                facts.instants[to].checked_sub(facts.instants[from]).filter(|_| facts.instants[from] > 0);
-            ticks.map(|ticks| ticks as f64 * f64::from(open.gpu.queue.get_timestamp_period()) * 1e-6)
+        let span = |first: usize| {
+            let [from, to] = [facts.instants[first], facts.instants[first + 1]];
+            let ms = |ticks: u64| ticks as f64 * f64::from(open.gpu.queue.get_timestamp_period()) * 1e-6;
+            (from > 0 && to >= from).then(|| [ms(from), ms(to)])
         };
-        let trace_ms = ms(2, 3).unwrap_or_else(|| start.ms());
-        let samples = begun.samples();
-        open.buffers.pace.learn(samples, trace_ms);
-        let update_ms = if begun.fits.is_empty() { None } else { ms(0, 1) };
-        Ok(Traced { film, rays: facts.rays, trace_ms, update_ms, readback_ms: Some(readback_ms) })
+        let spans = Spans { update: if begun.fits.is_empty() { None } else { span(0) }, trace: span(2) };
+        let length = |[from, to]: [f64; 2]| to - from;
+        let trace_ms = spans.trace.map_or_else(|| start.ms(), length);
+        open.buffers.pace.learn(begun.samples(), trace_ms);
+        Ok(Traced {
+            film,
+            rays: facts.rays,
+            trace_ms,
+            update_ms: spans.update.map(length),
+            readback_ms: Some(readback_ms),
+            spans,
+        })
     }
 }
 

@@ -1,8 +1,8 @@
 //! What kernels read of a frame's parts, as bytes.
 
+use super::records::ABSENT;
 use crate::accel::{Aabb, PackedNode};
 use crate::scene::{Geometry, PartHash, Texels, Texture, Triangles};
-use super::records::ABSENT;
 use rayon::ThreadPool;
 use rayon::prelude::*;
 

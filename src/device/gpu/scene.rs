@@ -1,10 +1,10 @@
 //! A frame's records: what kernels look its surfaces up in, from its parts, its shot, and where all that is held.
 
+use super::cuts::LANES_MOST;
 use super::records::{
     ABSENT, EmitterRecord, MAP_ALPHA_VARIES, MAP_CLAMP, MAP_FLOAT, MAP_SRGB, MATERIAL_MAPS, MIRRORED,
     MapRecord, ObjectRecord, PLACED, ShotConstants,
 };
-use super::cuts::LANES_MOST;
 use super::resident::Resident;
 use super::shaders::far;
 use crate::accel::{Aabb, PackedNode, PackedTop, Placement};
@@ -239,7 +239,8 @@ fn lists(
 /// Where an object's parts are; None where one is not there.
 fn places(record: &mut ObjectRecord, geometry: &Geometry, resident: &Resident) -> Option<()> {
     let of = |part: Option<PartHash>| part.map_or(Some(ABSENT), |part| resident.words_of(part));
-    record.triangle_slots = of((!geometry.material_runs.0.is_empty()).then(|| geometry.material_runs.hash()))?;
+    record.triangle_slots =
+        of((!geometry.material_runs.0.is_empty()).then(|| geometry.material_runs.hash()))?;
     record.corners = of(Some(geometry.triangles.hash()))?;
     record.colors = of(geometry.colors.as_ref().map(Part::hash))?;
     record.normals = of(geometry.normals.as_ref().map(|a| a.values.hash()))?;
