@@ -133,7 +133,10 @@ pub(super) fn rays(
             let beside = shot.camera.axes().1 * 0.1 * (look_at - eye).length();
             shot.lights = vec![lamp((eye + beside).as_vec3())];
         }
-        all.push((mesh.name.clone(), frame, shot));
+        // what of it materials and textures cost
+        let grey = (!mesh.geometry.materials.is_empty()).then(|| grey(&mesh.geometry));
+        all.push((mesh.name.clone(), frame, shot.clone()));
+        all.extend(grey.map(|frame| (format!("{}, grey", mesh.name), frame, shot)));
     }
     for (name, frame, shot) in all {
         let mut cells = [Cell::Absent; SHOTS.len()];
@@ -146,6 +149,13 @@ pub(super) fn rays(
         table.row(name, [cells[0], cells[1], cells[2], cells[3]]);
     }
     Ok(table)
+}
+
+/// A mesh without its materials.
+fn grey(geometry: &Geometry) -> Frame {
+    let (material_runs, materials) = (Part::new(MaterialRuns::default()), Vec::new());
+    let geometry = Arc::new(Geometry { material_runs, materials, ..geometry.clone() });
+    Frame { objects: vec![Object { geometry, transform: None }] }
 }
 
 /// What some frames took.

@@ -17,6 +17,8 @@ pub(super) fn encode(film: &Film, encoding: Encoding) -> Result<Vec<u8>, String>
     encoder.set_depth(depth);
     // the next stronger setting takes tens of times as long for a third less
     encoder.set_compression(png::Compression::Fast);
+    // choosing a filter for each row takes 1.3 to 2.8 times as long as all of this for a tenth less
+    encoder.set_filter(png::Filter::Sub);
     encoder.set_source_srgb(png::SrgbRenderingIntent::Perceptual);
     let write = || -> Result<(), png::EncodingError> {
         let mut writer = encoder.write_header()?;

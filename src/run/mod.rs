@@ -42,10 +42,10 @@ const FRAMES_READ_AHEAD: usize = 1;
 const STAGE_THREADS_BESIDE: usize = 2;
 
 /// Threads that read, and as many that encode: two of each keep a device busy that uses the same cores; another one is as fast
-/// as all of them together, half for each.
+/// as all of them together, three eighths for each, so that the threads that feed it have some, too.
 fn stage_threads(threads: usize, kind: DeviceKind) -> usize {
     match kind {
-        DeviceKind::Gpu => threads.div_ceil(2),
+        DeviceKind::Gpu => (3 * threads).div_ceil(8),
         DeviceKind::Cpu | DeviceKind::Fake => threads.clamp(1, STAGE_THREADS_BESIDE),
     }
 }
