@@ -273,6 +273,21 @@ fn a_large_tree_is_fitted_height_by_height() {
 }
 
 #[test]
+fn a_picture_beyond_the_largest_buffer_is_refused_with_the_figures() {
+    for adapter in usable() {
+        let (frame, shot) = (&one(scenes::sheet(13, |_| false, |_, p| p)), &shot_at(1.0));
+        let mut gpu = open(&adapter);
+        let right = bytes(&picture(&mut gpu, frame, shot));
+        let rows = adapter.binding_bytes() / (16_384 * 12) + 1;
+        let large = Shot { size: [16_384, rows as u32], aovs: AovSet::default(), ..shot.clone() };
+        let error = gpu.begin(frame, &large, Output::Linear, &Stop::default()).unwrap_err();
+        let DeviceError::BufferTooLarge { needed_bytes, most_bytes, .. } = &error else { panic!("{error}") };
+        assert!(*most_bytes == adapter.binding_bytes() && *needed_bytes >= 16_384 * 12 * rows, "{error}");
+        assert!(bytes(&picture(&mut gpu, frame, shot)) == right, "{}: it is not as before", adapter.name());
+    }
+}
+
+#[test]
 fn a_lost_gpu_says_so_once_and_begins_anew() {
     for adapter in usable() {
         let (frame, shot) = (&one(scenes::sheet(13, |_| false, |_, p| p)), &shot_at(1.0));

@@ -52,8 +52,8 @@ fn start_sample(at: Sample) {
     start_path(camera_ray(place.x, place.y));
 }
 
-// Adds a pixel's samples `lane`, `lane + lanes` and so on. All rays but those to lights are traced at one place: a driver
-// puts a whole traversal wherever there is a call.
+// Adds a pixel's samples `lane`, `lane + lanes` and so on. All rays but those to lights are traced at one place, one of the
+// two below: a driver puts a whole traversal wherever there is a call.
 fn add_samples(pixel: vec2<u32>, lane: u32, lanes: u32) {
     var at = Sample(pixel, lane, 0u);
     if (HAS_ONE_RAY) {
@@ -123,6 +123,7 @@ fn meet(hit: Hit, at: Sample) -> bool {
                 path.sees_first = false;
             }
         }
+        // of other frames all is opaque
         var covered = 1.0;
         if (HAS_BRANCHES || GOES_ON) {
             covered = cover(m);

@@ -193,6 +193,26 @@ mod tests {
     }
 
     #[test]
+    fn leaves_are_split_while_their_node_has_room() {
+        // a chain's inner nodes of four triangles and fewer are leaves: five and one of four
+        let shape = |fill, leaves| {
+            let leaves_may = Leaves { most: 4, block: 0.0, triangle: 0.1, fill };
+            Shape::collapse(&chain(leaves), leaves_may)
+        };
+        let sizes = |shape: &Shape| -> Vec<usize> {
+            let count = |b: &[u32; WIDTH]| b.iter().filter(|t| **t != NO_TRIANGLE).count();
+            shape.blocks.iter().map(count).collect()
+        };
+        assert_eq!(sizes(&shape(false, 9)).into_iter().max(), Some(4));
+        for (leaves, most) in [(3, 1), (8, 1), (9, 2)] {
+            let filled = shape(true, leaves);
+            assert_eq!(filled.children.len(), 1, "{leaves}");
+            assert_eq!(sizes(&filled).into_iter().max(), Some(most), "{leaves}");
+            assert_eq!(sizes(&filled).into_iter().sum::<usize>(), leaves as usize);
+        }
+    }
+
+    #[test]
     fn a_chain_is_split_by_number_where_it_grows_too_deep() {
         for leaves in [1, 2, 9, 100, 100_000] {
             let shape = Shape::collapse(&chain(leaves), Leaves::BLOCKS);

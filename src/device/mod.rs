@@ -154,6 +154,32 @@ pub enum DeviceError {
         /// What is allowed.
         budget_bytes: u64,
     },
+    /// Something must lie in one buffer, and no buffer may be so large.
+    #[error(
+        "{device}: {what} would take a buffer of {needed_bytes} bytes, {most_bytes} are the most there; use another device, or a smaller picture or scene"
+    )]
+    BufferTooLarge {
+        /// Which device.
+        device: String,
+        /// What lies in the buffer.
+        what: String,
+        /// What it takes.
+        needed_bytes: u64,
+        /// What a buffer may take.
+        most_bytes: u64,
+    },
+    /// The device's memory is full, though the budget is not.
+    #[error(
+        "{device}: there is no memory for {needed_bytes} bytes of {what}; lower --device-memory, or end what else uses the device"
+    )]
+    MemoryFull {
+        /// Which device.
+        device: String,
+        /// What was to be held.
+        what: String,
+        /// What it takes.
+        needed_bytes: u64,
+    },
     /// The device is gone and holds nothing any more.
     #[error("{device}: lost: {why}")]
     Lost {

@@ -260,15 +260,41 @@ impl Gpu {
         waited.map(|_| ()).map_err(|e| DeviceError::Lost { device: self.name.clone(), why: e.to_string() })
     }
 
-    /// A buffer; None where there is no memory for it.
-    pub(super) fn buffer(&self, label: &str, size: u64, usage: wgpu::BufferUsages) -> Option<wgpu::Buffer> {
+    /// A buffer that kernels bind; `what` lies in it.
+    pub(super) fn buffer(
+        &self,
+        what: &str,
+        size: u64,
+        usage: wgpu::BufferUsages,
+    ) -> Result<wgpu::Buffer, DeviceError> {
+        self.allows(what, size)?;
         let scope = self.device.push_error_scope(wgpu::ErrorFilter::OutOfMemory);
         let buffer = self.device.create_buffer(&wgpu::BufferDescriptor {
-            label: Some(label),
+            label: Some(what),
             size,
             usage,
             mapped_at_creation: false,
         });
-        pollster::block_on(scope.pop()).is_none().then_some(buffer)
+        match pollster::block_on(scope.pop()) {
+            None => Ok(buffer),
+            Some(_) => Err(DeviceError::MemoryFull {
+                device: self.name.clone(),
+                what: what.to_string(),
+                needed_bytes: size,
+            }),
+        }
+    }
+
+    /// An error where a buffer of so many bytes is larger than one may be.
+    pub(super) fn allows(&self, what: &str, size: u64) -> Result<(), DeviceError> {
+        if size <= self.binding_bytes {
+            return Ok(());
+        }
+        Err(DeviceError::BufferTooLarge {
+            device: self.name.clone(),
+            what: what.to_string(),
+            needed_bytes: size,
+            most_bytes: self.binding_bytes,
+        })
     }
 }

@@ -1,6 +1,7 @@
 //! The small lists of one frame, side by side in one buffer that is written at once.
 
 use super::adapter::Gpu;
+use crate::device::DeviceError;
 use bytemuck::Pod;
 use std::ops::Range;
 
@@ -19,10 +20,6 @@ pub(super) type Section = Range<u64>;
 impl Arena {
     pub(super) fn clear(&mut self) {
         self.bytes.clear();
-    }
-
-    pub(super) fn bytes(&self) -> u64 {
-        self.bytes.len() as u64
     }
 
     /// Adds a list; one without anything gets one zeroed record, for a binding must not be empty.
@@ -51,14 +48,16 @@ impl Arena {
     pub(super) const STEP: u32 = ALIGNMENT as u32;
 
     /// Writes it all into a buffer, which is made anew where it is too small.
-    pub(super) fn write(&mut self, gpu: &Gpu, buffer: &mut Option<wgpu::Buffer>) -> Option<()> {
+    pub(super) fn write(&mut self, gpu: &Gpu, buffer: &mut Option<wgpu::Buffer>) -> Result<(), DeviceError> {
         self.bytes.resize(self.bytes.len().next_multiple_of(4), 0);
         let needed = self.bytes.len() as u64;
         if buffer.as_ref().is_none_or(|b| b.size() < needed) {
             let usage = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST;
-            *buffer = Some(gpu.buffer("frame", needed.next_power_of_two().max(1 << 16), usage)?);
+            *buffer = Some(gpu.buffer("lists of a frame", needed.next_power_of_two().max(1 << 16), usage)?);
         }
-        gpu.queue.write_buffer(buffer.as_ref()?, 0, &self.bytes);
-        Some(())
+        if let Some(buffer) = buffer {
+            gpu.queue.write_buffer(buffer, 0, &self.bytes);
+        }
+        Ok(())
     }
 }

@@ -70,6 +70,21 @@ mod tests {
     use super::*;
 
     #[test]
+    fn dispatches_are_as_long_as_the_pace_allows() {
+        let pace = |samples, ms| {
+            let mut pace = Pace::default();
+            pace.learn(samples, ms);
+            [pace.samples_most(false), pace.samples_most(true)]
+        };
+        assert_eq!([false, true].map(|b| Pace::default().samples_most(b)), [1 << 22, 1 << 19]);
+        // a million samples a ms, a hundred thousand, very many; a frame that took no time teaches nothing
+        assert_eq!(pace(3_000_000, 3.0), [10_000_000; 2]);
+        assert_eq!(pace(300_000, 3.0), [1 << 22, 1_000_000]);
+        assert_eq!(pace(1 << 40, 1.0), [1 << 25; 2]);
+        assert_eq!(pace(1 << 40, 0.0), [1 << 22, 1 << 19]);
+    }
+
+    #[test]
     fn cuts_cover_all_rows_once() {
         for lanes in [1, 2, 4, 8, 16] {
             let tile = tile(lanes);

@@ -260,7 +260,7 @@ impl Ground<'_> {
         let Self { gpu, buffers, .. } = self;
         let storage = wgpu::BufferUsages::STORAGE;
         let (source, target) = (wgpu::BufferUsages::COPY_SRC, wgpu::BufferUsages::COPY_DST);
-        room(gpu, "waiting", &mut buffers.waiting, waiting_bytes.max(16), storage)?;
+        room(gpu, "waiting rays", &mut buffers.waiting, waiting_bytes.max(16), storage)?;
         room(gpu, "counters", &mut buffers.counters, 4 * COUNTERS, storage | source | target)?;
         if gpu.features.contains(wgpu::Features::TIMESTAMP_QUERY) && buffers.instants.is_none() {
             let set = gpu.device.create_query_set(&wgpu::QuerySetDescriptor {
@@ -277,10 +277,10 @@ impl Ground<'_> {
         let Slot { film, back } = &mut buffers.slots[slot];
         if gpu.features.contains(wgpu::Features::MAPPABLE_PRIMARY_BUFFERS) {
             // kernels write straight into what the host reads
-            room(gpu, "film", film, layout.bytes(), storage | target | wgpu::BufferUsages::MAP_READ)?;
+            room(gpu, "the picture", film, layout.bytes(), storage | target | wgpu::BufferUsages::MAP_READ)?;
         } else {
-            room(gpu, "film", film, layout.bytes(), storage | source | target)?;
-            room(gpu, "read back", back, layout.bytes(), target | wgpu::BufferUsages::MAP_READ)?;
+            room(gpu, "the picture", film, layout.bytes(), storage | source | target)?;
+            room(gpu, "the picture", back, layout.bytes(), target | wgpu::BufferUsages::MAP_READ)?;
         }
         Ok(slot)
     }
@@ -323,14 +323,7 @@ impl Ground<'_> {
 
     fn write_arena(&mut self) -> Result<(), DeviceError> {
         let Buffers { arena, frame, .. } = &mut *self.buffers;
-        if arena.write(self.gpu, frame).is_none() {
-            return Err(DeviceError::OutOfMemory {
-                device: self.gpu.name.clone(),
-                needed_bytes: arena.bytes(),
-                budget_bytes: self.gpu.binding_bytes,
-            });
-        }
-        Ok(())
+        arena.write(self.gpu, frame)
     }
 
     fn encoder(&self) -> wgpu::CommandEncoder {
@@ -404,7 +397,7 @@ impl Ground<'_> {
 /// Makes a buffer of so many bytes at least.
 fn room(
     gpu: &Gpu,
-    label: &str,
+    what: &str,
     buffer: &mut Option<wgpu::Buffer>,
     bytes: u64,
     usage: wgpu::BufferUsages,
@@ -413,16 +406,10 @@ fn room(
     if buffer.as_ref().is_some_and(|b| b.size() >= bytes) {
         return Ok(());
     }
-    let refused = || DeviceError::OutOfMemory {
-        device: gpu.name.clone(),
-        needed_bytes: bytes,
-        budget_bytes: gpu.binding_bytes,
-    };
-    if bytes > gpu.binding_bytes {
-        return Err(refused());
-    }
+    gpu.allows(what, bytes)?;
+    // the old one first, so that both need not have room
     *buffer = None;
-    *buffer = Some(gpu.buffer(label, bytes, usage).ok_or_else(refused)?);
+    *buffer = Some(gpu.buffer(what, bytes, usage)?);
     Ok(())
 }
 

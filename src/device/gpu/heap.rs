@@ -20,27 +20,9 @@ pub(super) struct Heap {
 /// Units at first.
 const FIRST: u32 = 1024;
 
-/// Why there is no place.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct Full {
-    /// Bytes that the buffer would have.
-    pub(super) needed_bytes: u64,
-    /// Bytes that it may have.
-    pub(super) most_bytes: u64,
-}
-
-impl Full {
-    /// What a device says of it.
-    pub(super) fn error(self, device: &str) -> DeviceError {
-        let Self { needed_bytes, most_bytes } = self;
-        DeviceError::OutOfMemory { device: device.to_string(), needed_bytes, budget_bytes: most_bytes }
-    }
-}
-
 impl Heap {
-    pub(super) fn new(gpu: &Gpu, label: &'static str, unit_bytes: u64) -> Result<Self, Full> {
-        let bytes = u64::from(FIRST) * unit_bytes;
-        let buffer = gpu.buffer(label, bytes, USAGE).ok_or(Full { needed_bytes: bytes, most_bytes: 0 })?;
+    pub(super) fn new(gpu: &Gpu, label: &'static str, unit_bytes: u64) -> Result<Self, DeviceError> {
+        let buffer = gpu.buffer(label, u64::from(FIRST) * unit_bytes, USAGE)?;
         Ok(Self { label, unit_bytes, buffer, capacity: FIRST, free: BTreeMap::from([(0, FIRST)]) })
     }
 
@@ -55,7 +37,7 @@ impl Heap {
 
     /// Takes a place of so many units, which begins at a multiple of four units: the first that is large enough, else the
     /// buffer grows.
-    pub(super) fn take(&mut self, gpu: &Gpu, units: u64) -> Result<Range<u32>, Full> {
+    pub(super) fn take(&mut self, gpu: &Gpu, units: u64) -> Result<Range<u32>, DeviceError> {
         // all places have multiples of four, so that all begin at one
         let units = units.next_multiple_of(4);
         let fits = |(_, length): &(&u32, &u32)| u64::from(**length) >= units;
@@ -90,20 +72,17 @@ impl Heap {
     }
 
     /// Makes the buffer larger; gives where so many units are free at its end.
-    fn grow(&mut self, gpu: &Gpu, units: u64) -> Result<u32, Full> {
+    fn grow(&mut self, gpu: &Gpu, units: u64) -> Result<u32, DeviceError> {
         let last = self.free.iter().next_back().map(|(&start, &length)| (start, start + length));
         let start = last.filter(|(_, end)| *end == self.capacity).map_or(self.capacity, |(start, _)| start);
         let needed = u64::from(start) + units;
+        gpu.allows(self.label, needed * self.unit_bytes)?;
         let most = (gpu.binding_bytes / self.unit_bytes).min(u64::from(u32::MAX));
-        let full = Full { needed_bytes: needed * self.unit_bytes, most_bytes: most * self.unit_bytes };
-        if needed > most {
-            return Err(full);
-        }
         // by a half at least, so that what grows bit by bit is copied a few times only
         let wanted = (u64::from(self.capacity) * 3 / 2).max(needed).min(most);
         let make =
             |units: u64| gpu.buffer(self.label, units * self.unit_bytes, USAGE).map(|b| (b, units as u32));
-        let (buffer, capacity) = make(wanted).or_else(|| make(needed)).ok_or(full)?;
+        let (buffer, capacity) = make(wanted).or_else(|_| make(needed))?;
         let mut encoder = gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
         encoder.copy_buffer_to_buffer(&self.buffer, 0, &buffer, 0, self.bytes());
         gpu.queue.submit([encoder.finish()]);

@@ -113,7 +113,7 @@ impl GpuDevice {
         if self.open.is_none() {
             let gpu = self.adapter.open()?;
             let pipelines = Pipelines::new(&gpu, self.store.as_ref());
-            let resident = Resident::new(&gpu).map_err(|full| full.error(&self.info.name))?;
+            let resident = Resident::new(&gpu)?;
             gpu.check()?;
             let (buffers, boxes) = (Buffers::default(), HashMap::new());
             self.open = Some(Open {
@@ -169,7 +169,7 @@ impl GpuDevice {
         assert!(open.under_way.len() < SLOTS, "a frame must be finished before another is begun");
         let background = match &shot.background {
             Background::Color(_) => None,
-            Background::Picture { texture, .. } => Some(open.background(texture.hash(), texture, info)?),
+            Background::Picture { texture, .. } => Some(open.background(texture.hash(), texture)?),
         };
         let before = std::mem::take(&mut open.boxes);
         let mut boxes = HashMap::new();
@@ -184,12 +184,12 @@ impl GpuDevice {
         let mut records =
             Records::new(frame, shot, output, &open.resident, background, box_of).map_err(not_resident)?;
         open.boxes = boxes;
-        let top = open.place_top(&mut records, info)?;
+        let top = open.place_top(&mut records)?;
         let waiting = std::mem::take(&mut open.resident.fits);
         let begun = open.ground().begin(&Fits::new(&waiting), &records, shot, output, stop);
         // the queue keeps the order: what is written there next comes after this frame
         open.resident.heaps.nodes.give(top);
-        if matches!(begun, Err(DeviceError::OutOfMemory { .. })) {
+        if matches!(begun, Err(DeviceError::BufferTooLarge { .. } | DeviceError::MemoryFull { .. })) {
             // nothing was handed over
             open.resident.fits = waiting;
         }
@@ -244,12 +244,7 @@ impl Open {
     }
 
     /// Where the texels of a background picture begin; it is sent where it is another than before.
-    fn background(
-        &mut self,
-        name: PartHash,
-        texture: &Texture,
-        info: &DeviceInfo,
-    ) -> Result<u32, DeviceError> {
+    fn background(&mut self, name: PartHash, texture: &Texture) -> Result<u32, DeviceError> {
         if let Some((held, place)) = &self.background
             && *held == name
         {
@@ -260,19 +255,19 @@ impl Open {
             texels.give(place);
         }
         let bytes = parts::texels(texture);
-        let place = texels.take(&self.gpu, bytes.len() as u64 / 4).map_err(|full| full.error(&info.name))?;
+        let place = texels.take(&self.gpu, bytes.len() as u64 / 4)?;
         texels.write(&self.gpu, place.start, bytes);
         self.background = Some((name, place.clone()));
         Ok(place.start)
     }
 
     /// Puts the level above a frame's objects among the nodes.
-    fn place_top(&mut self, records: &mut Records, info: &DeviceInfo) -> Result<Range<u32>, DeviceError> {
+    fn place_top(&mut self, records: &mut Records) -> Result<Range<u32>, DeviceError> {
         if records.top.is_empty() {
             return Ok(0..0);
         }
         let nodes = &mut self.resident.heaps.nodes;
-        let place = nodes.take(&self.gpu, records.top.len() as u64).map_err(|full| full.error(&info.name))?;
+        let place = nodes.take(&self.gpu, records.top.len() as u64)?;
         let moved: Vec<PackedNode> = records
             .top
             .iter()

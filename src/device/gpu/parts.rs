@@ -83,3 +83,17 @@ pub(super) fn world_box(positions: &[[f32; 3]], pool: &ThreadPool) -> Aabb {
         positions.par_iter().with_min_len(GRAIN).filter(finite).map(point).reduce(|| Aabb::EMPTY, union)
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn triangles_find_their_slots() {
+        assert_eq!(triangle_slots(&[]), [0_u32; 0]);
+        assert_eq!(triangle_slots(&[[0, 7]]), [0, 7]);
+        // triangles 0 and 1 have none; 2 to 4 slot 5, then one without, from 6 on slot 1
+        let runs = [[2, 5], [5, ABSENT], [6, 1]];
+        assert_eq!(triangle_slots(&runs), [6, 1, ABSENT, ABSENT, 5, 5, 5, ABSENT]);
+    }
+}

@@ -1,7 +1,7 @@
 //! What a GPU holds: parts and trees at places of its heaps.
 
 use super::adapter::Gpu;
-use super::heap::{Full, Heap};
+use super::heap::Heap;
 use super::parts::{move_nodes, texels, triangle_slots, vertices, words};
 use super::records::{ABSENT, RefitTree};
 use crate::accel::{NODE_BYTES, PackedTree, Quality, TRIANGLE_BYTES};
@@ -33,12 +33,12 @@ pub(super) struct Heaps {
 }
 
 impl Heaps {
-    pub(super) fn new(gpu: &Gpu) -> Result<Self, Full> {
+    pub(super) fn new(gpu: &Gpu) -> Result<Self, DeviceError> {
         let mut heaps = Self {
-            nodes: Heap::new(gpu, "nodes", NODE_BYTES)?,
+            nodes: Heap::new(gpu, "nodes of trees", NODE_BYTES)?,
             triangles: Heap::new(gpu, "triangles", TRIANGLE_BYTES)?,
-            words: Heap::new(gpu, "words", 4)?,
-            texels: Heap::new(gpu, "texels", 4)?,
+            words: Heap::new(gpu, "indices and attributes", 4)?,
+            texels: Heap::new(gpu, "textures", 4)?,
         };
         let table = heaps.texels.take(gpu, LINEAR_FROM_SRGB8.len() as u64)?;
         heaps.texels.write(gpu, table.start, bytemuck::cast_slice(&*LINEAR_FROM_SRGB8));
@@ -130,7 +130,7 @@ impl Means<'_> {
 }
 
 impl Resident {
-    pub(super) fn new(gpu: &Gpu) -> Result<Self, Full> {
+    pub(super) fn new(gpu: &Gpu) -> Result<Self, DeviceError> {
         Ok(Self {
             residency: Residency::default(),
             heaps: Heaps::new(gpu)?,
@@ -252,7 +252,7 @@ impl Resident {
             self.forget(idle);
             self.residency.evict(idle);
         }
-        heap(&mut self.heaps).take(means.gpu, units).map_err(|full| full.error(&means.info.name))
+        heap(&mut self.heaps).take(means.gpu, units)
     }
 
     fn build(&mut self, name: PartHash, geometry: &Geometry, means: &Means) -> Result<(), DeviceError> {
@@ -430,12 +430,9 @@ fn refuse_beyond_bindings(frame: &Frame, means: &Means) -> Result<(), DeviceErro
             triangles += geometry.triangles.0.len() as u64;
         }
     }
+    let gpu = means.gpu;
+    gpu.allows("triangles", triangles * TRIANGLE_BYTES)?;
     // by triangle: its vertices and number, its slot, and a share of the lists of nodes
-    let largest = [triangles * TRIANGLE_BYTES, words_bytes + triangles * 24, texels_bytes].into_iter().max();
-    match largest {
-        Some(bytes) if bytes > means.gpu.binding_bytes => {
-            Err(means.out_of_memory(bytes, means.gpu.binding_bytes))
-        }
-        _ => Ok(()),
-    }
+    gpu.allows("indices and attributes", words_bytes + triangles * 24)?;
+    gpu.allows("textures", texels_bytes)
 }
