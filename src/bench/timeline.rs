@@ -261,7 +261,7 @@ impl Lanes {
                 let corners = [(x(bar.from), y + 4), (x(bar.to).max(x(bar.from) + 1), y + LANE - 4)];
                 root.draw(&Rectangle::new(corners, bar.stage.color().filled()))?;
                 if corners[1].0 - corners[0].0 >= 12 {
-                    let middle = ((corners[0].0 + corners[1].0) / 2, y + LANE / 2);
+                    let middle = (i32::midpoint(corners[0].0, corners[1].0), y + LANE / 2);
                     let number = (bar.frame + 1).to_string();
                     root.draw(&Text::new(number, middle, text(13, HPos::Center, &WHITE)))?;
                 }
@@ -271,7 +271,7 @@ impl Lanes {
     }
 }
 
-fn text<'a>(size: i32, h: HPos, color: &'a RGBColor) -> TextStyle<'a> {
+fn text(size: i32, h: HPos, color: &RGBColor) -> TextStyle<'_> {
     TextStyle::from((FONT, size).into_font()).color(color).pos(Pos::new(h, VPos::Center))
 }
 
