@@ -114,6 +114,8 @@ fn gpus_show_surfaces_as_the_cpu_does_block_by_block() {
     let frame = Frame { objects: vec![Object { geometry: loaded.geometry, transform: None }] };
     let mut cpu = CpuDevice::new(2, BUDGET_BYTES).unwrap();
     let right = picture(&mut cpu, &frame, &shot);
+    let lit = right.rgb.iter().filter(|p| p[0] > 0.3).count();
+    assert!(lit > right.rgb.len() / 20, "only {lit} pixels are lit");
     for adapter in usable() {
         let film = picture(&mut open(&adapter), &frame, &shot);
         Agreement::new(&right, &film).check_blocks(&adapter.name());

@@ -5,7 +5,8 @@ override SINGLE_TREE: bool = false;
 
 // A group of children that wait: the first one's place and which of them were entered; the first entries of each thread's
 // stack are in the workgroup's memory, the others in its own, which is cleared for each thread: as many as a frame's trees
-// need, see `far` in src/device/gpu/shaders.rs. The less a workgroup has of its memory, the more of them run at once.
+// need, see `far` in src/device/gpu/shaders.rs. The less a workgroup has of its memory, the more of them run at once;
+// trace.wgsl needs two entries a thread of it when all have traced.
 const NEAR: u32 = 2u;
 const FAR: u32 = 48u;
 var<workgroup> near_stack: array<vec2<u32>, NEAR * GROUP>;

@@ -42,7 +42,7 @@ pub(super) struct Chart {
 }
 
 const SIZE: (u32, u32) = (900, 620);
-const FONT: &str = "sans-serif";
+pub(super) const FONT: &str = "sans-serif";
 /// Okabe and Ito's palette, which people with any colour vision can tell apart.
 const COLORS: [RGBColor; 4] =
     [RGBColor(0, 114, 178), RGBColor(230, 159, 0), RGBColor(0, 158, 115), RGBColor(204, 121, 167)];
@@ -52,24 +52,37 @@ const WIDTHS: [u32; 4] = [2, 6, 4, 2];
 impl Chart {
     /// The chart as SVG.
     pub(super) fn svg(&self) -> Result<String, String> {
-        let mut svg = String::new();
-        self.draw(&mut svg).map_err(|e| e.to_string())?;
-        Ok(svg)
+        svg(SIZE, |root| self.draw(root))
     }
 
-    fn draw(&self, svg: &mut String) -> Result<(), Box<dyn Error>> {
-        let root = SVGBackend::with_string(svg, SIZE).into_drawing_area();
-        root.fill(&WHITE)?;
+    fn draw(&self, root: &Area<'_>) -> Result<(), Box<dyn Error>> {
         let root = root.titled(&self.title, (FONT, 22))?;
         for (area, panel) in root.split_evenly((self.panels.len(), 1)).iter().zip(&self.panels) {
             panel.draw(area)?;
         }
-        root.present()?;
         Ok(())
     }
 }
 
-type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
+/// Where charts are drawn.
+pub(super) type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
+
+/// What is drawn on white, as SVG.
+pub(super) fn svg(
+    size: (u32, u32),
+    draw: impl FnOnce(&Area<'_>) -> Result<(), Box<dyn Error>>,
+) -> Result<String, String> {
+    let drawn = |svg: &mut String| {
+        let root = SVGBackend::with_string(svg, size).into_drawing_area();
+        root.fill(&WHITE)?;
+        draw(&root)?;
+        root.present()?;
+        Ok::<_, Box<dyn Error>>(())
+    };
+    let mut svg = String::new();
+    drawn(&mut svg).map_err(|e| e.to_string())?;
+    Ok(svg)
+}
 
 impl Panel {
     fn draw(&self, area: &Area<'_>) -> Result<(), Box<dyn Error>> {

@@ -1,6 +1,7 @@
 //! A few warm frames over time: what the host does for them and what the device does, one frame at a time and as many under
 //! way as the device takes.
 
+use super::chart::{Area, FONT, svg};
 use super::frames::{SPHERE, failed, poses, sphere_shot};
 use super::table::{Cell, Table};
 use super::{Bench, BenchError};
@@ -8,10 +9,7 @@ use crate::clock::Stopwatch;
 use crate::device::{Device, Output, Spans, Stop};
 use crate::plan::{Update, Wishes, plan_frame};
 use crate::scene::{Frame, Shot};
-use plotters::coord::Shift;
-use plotters::prelude::{
-    BLACK, Color, DrawingArea, IntoDrawingArea, PathElement, RGBColor, Rectangle, SVGBackend, Text, WHITE,
-};
+use plotters::prelude::{BLACK, Color, PathElement, RGBColor, Rectangle, Text, WHITE};
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 use plotters::style::{IntoFont, TextStyle};
 use std::collections::VecDeque;
@@ -193,26 +191,19 @@ fn bars(
 }
 
 const SIZE: (u32, u32) = (1000, 420);
-const FONT: &str = "sans-serif";
 /// Where lanes begin and end, x.
 const LEFT: i32 = 90;
 const RIGHT: i32 = 980;
 /// A lane's height.
 const LANE: i32 = 44;
 
-type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
-
 impl Timeline {
     /// The chart as SVG.
     pub(super) fn svg(&self) -> Result<String, String> {
-        let mut svg = String::new();
-        self.draw(&mut svg).map_err(|e| e.to_string())?;
-        Ok(svg)
+        svg(SIZE, |root| self.draw(root))
     }
 
-    fn draw(&self, svg: &mut String) -> Result<(), Box<dyn Error>> {
-        let root = SVGBackend::with_string(svg, SIZE).into_drawing_area();
-        root.fill(&WHITE)?;
+    fn draw(&self, root: &Area<'_>) -> Result<(), Box<dyn Error>> {
         // both have one scale: that of the frames that are shown of the slowest
         let shown = |b: &&Bar| b.frame < SHOWN;
         let most =
@@ -226,12 +217,10 @@ impl Timeline {
             from += 48 + 8 * stage.word().len() as i32;
         }
         for (i, lanes) in (0..).zip(&self.lanes) {
-            lanes.draw(&root, 50 + i * (2 * LANE + 70), &x)?;
+            lanes.draw(root, 50 + i * (2 * LANE + 70), &x)?;
         }
         let y = 50 + self.lanes.len() as i32 * (2 * LANE + 70) - 20;
-        axis(&root, y, most, &x)?;
-        root.present()?;
-        Ok(())
+        axis(root, y, most, &x)
     }
 }
 

@@ -131,13 +131,14 @@ impl Agreement {
         faults
     }
 
-    /// As [`Self::check`]; and at least half of the blocks with a surface could be judged, which takes a picture of some size.
+    /// As [`Self::check`]; and there are blocks with a surface, of which at least half could be judged, which takes a picture of
+    /// some size.
     #[track_caller]
     pub fn check_blocks(&self, what: &str) {
         self.check(what);
         let Self { covered_blocks, judged_blocks, .. } = self;
         assert!(
-            2 * judged_blocks >= *covered_blocks,
+            *judged_blocks > 0 && 2 * judged_blocks >= *covered_blocks,
             "{what}: {judged_blocks} of {covered_blocks} have no edge"
         );
     }

@@ -287,14 +287,11 @@ impl Gpu {
 
     /// An error where a buffer of so many bytes is larger than one may be.
     pub(super) fn allows(&self, what: &str, size: u64) -> Result<(), DeviceError> {
-        if size <= self.binding_bytes {
-            return Ok(());
-        }
-        Err(DeviceError::BufferTooLarge {
-            device: self.name.clone(),
-            what: what.to_string(),
-            needed_bytes: size,
-            most_bytes: self.binding_bytes,
-        })
+        if size <= self.binding_bytes { Ok(()) } else { Err(self.too_large(what, size, self.binding_bytes)) }
+    }
+
+    pub(super) fn too_large(&self, what: &str, needed_bytes: u64, most_bytes: u64) -> DeviceError {
+        let (device, what) = (self.name.clone(), what.to_string());
+        DeviceError::BufferTooLarge { device, what, needed_bytes, most_bytes }
     }
 }

@@ -76,8 +76,11 @@ impl Heap {
         let last = self.free.iter().next_back().map(|(&start, &length)| (start, start + length));
         let start = last.filter(|(_, end)| *end == self.capacity).map_or(self.capacity, |(start, _)| start);
         let needed = u64::from(start) + units;
-        gpu.allows(self.label, needed * self.unit_bytes)?;
+        // places are numbers of 32 bits
         let most = (gpu.binding_bytes / self.unit_bytes).min(u64::from(u32::MAX));
+        if needed > most {
+            return Err(gpu.too_large(self.label, needed * self.unit_bytes, most * self.unit_bytes));
+        }
         // by a half at least, so that what grows bit by bit is copied a few times only
         let wanted = (u64::from(self.capacity) * 3 / 2).max(needed).min(most);
         let make =

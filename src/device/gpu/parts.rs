@@ -27,7 +27,7 @@ pub(super) fn move_nodes(nodes: &mut [PackedNode], first_node: u32, first_triang
 }
 
 /// The slots of triangles: the first triangle of the last slot, that slot, then the slots of the triangles before it, so that
-/// it does not depend on how many follow. Takes no more than the faces, which a GPU does not hold.
+/// it does not depend on how many follow. A budget counts the runs instead, but also the faces, which a GPU does not hold.
 pub(super) fn triangle_slots(runs: &[[u32; 2]]) -> Vec<u32> {
     let Some(&[last_first, last_slot]) = runs.last() else { return Vec::new() };
     let mut words = vec![ABSENT; 2 + last_first as usize];
