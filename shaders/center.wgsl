@@ -22,7 +22,11 @@ fn center(
     if (pixel.x < shot.size.x && pixel.y < min(shot.size.y, slice.end_row)) {
         fill_center(pixel);
     }
-    add_counts(local, group.y * groups.x + group.x);
+    clear_group_counts(local);
+    workgroupBarrier();
+    add_to_group_counts();
+    workgroupBarrier();
+    add_group_counts(local, group.y * groups.x + group.x);
 }
 
 fn fill_center(pixel: vec2<u32>) {

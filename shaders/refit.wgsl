@@ -45,12 +45,24 @@ struct RefitLevel {
 @group(0) @binding(7) var<storage, read> rows: array<vec4<u32>>;
 
 // Threads of a workgroup.
-override GROUP: u32 = 256u;
+override GROUP: u32 = 64u;
 
-var<workgroup> lows: array<vec4<f32>, GROUP>;
-var<workgroup> highs: array<vec4<f32>, GROUP>;
-var<workgroup> low_bytes: array<u32, GROUP>;
-var<workgroup> high_bytes: array<u32, GROUP>;
+// What threads hand over, first boxes and then bytes: the less a workgroup has of its memory, the more is left to caches.
+var<workgroup> given: array<array<u32, 7>, GROUP>;
+
+fn give_box(thread: u32, low: vec4<f32>, high: vec3<f32>) {
+    let l = bitcast<vec4<u32>>(low);
+    let h = bitcast<vec3<u32>>(high);
+    given[thread] = array<u32, 7>(l.x, l.y, l.z, l.w, h.x, h.y, h.z);
+}
+
+fn given_low(thread: u32) -> vec4<f32> {
+    return bitcast<vec4<f32>>(vec4<u32>(given[thread][0], given[thread][1], given[thread][2], given[thread][3]));
+}
+
+fn given_high(thread: u32) -> vec3<f32> {
+    return bitcast<vec3<f32>>(vec3<u32>(given[thread][4], given[thread][5], given[thread][6]));
+}
 
 fn is_finite(v: vec3<f32>) -> bool {
     let exponents = bitcast<vec3<u32>>(v) & vec3<u32>(INFINITE_BITS);
@@ -146,14 +158,10 @@ fn bytes_of(row: u32, word: u32, first_lane: u32) -> u32 {
     // rows 2 to 4 hold, by halves, the lesser x, y, z, the greater x, y, z
     let plane = (row - 2u) * 2u + word / 2u;
     let lane = first_lane + 4u * (word & 1u);
+    let end = plane / 3u;
     let shift = 8u * (plane % 3u);
-    var bytes = vec4<u32>(0u);
-    if (plane < 3u) {
-        bytes = vec4<u32>(low_bytes[lane], low_bytes[lane + 1u], low_bytes[lane + 2u], low_bytes[lane + 3u]);
-    } else {
-        bytes = vec4<u32>(high_bytes[lane], high_bytes[lane + 1u], high_bytes[lane + 2u], high_bytes[lane + 3u]);
-    }
-    bytes = (bytes >> vec4<u32>(shift)) & vec4<u32>(0xffu);
+    let lanes = vec4<u32>(given[lane][end], given[lane + 1u][end], given[lane + 2u][end], given[lane + 3u][end]);
+    let bytes = (lanes >> vec4<u32>(shift)) & vec4<u32>(0xffu);
     return bytes.x | (bytes.y << 8u) | (bytes.z << 16u) | (bytes.w << 24u);
 }
 
@@ -184,16 +192,16 @@ fn fit_node(tree: RefitTree, node: u32, is_there: bool, thread: u32) {
             }
         }
     }
-    lows[thread] = vec4<f32>(box.low, area_below + half_area(box));
-    highs[thread] = vec4<f32>(box.high, 0.0);
+    give_box(thread, vec4<f32>(box.low, area_below + half_area(box)), box.high);
     workgroupBarrier();
-    var low = lows[first_lane];
-    var high = highs[first_lane].xyz;
+    var low = given_low(first_lane);
+    var high = given_high(first_lane);
     for (var i = 1u; i < 8u; i++) {
-        let other = lows[first_lane + i];
+        let other = given_low(first_lane + i);
         low = vec4<f32>(min(low.xyz, other.xyz), low.w + other.w);
-        high = max(high, highs[first_lane + i].xyz);
+        high = max(high, given_high(first_lane + i));
     }
+    workgroupBarrier();
     let is_empty = low.x > high.x;
     let origin = select(low.xyz, vec3<f32>(0.0), is_empty);
     let end = select(high, vec3<f32>(0.0), is_empty);
@@ -217,8 +225,8 @@ fn fit_node(tree: RefitTree, node: u32, is_there: bool, thread: u32) {
             quanta(origin.z, box.high.z, exponents.z, true),
         );
     }
-    low_bytes[thread] = low_quanta.x | (low_quanta.y << 8u) | (low_quanta.z << 16u);
-    high_bytes[thread] = high_quanta.x | (high_quanta.y << 8u) | (high_quanta.z << 16u);
+    given[thread][0] = low_quanta.x | (low_quanta.y << 8u) | (low_quanta.z << 16u);
+    given[thread][1] = high_quanta.x | (high_quanta.y << 8u) | (high_quanta.z << 16u);
     workgroupBarrier();
     if (is_there) {
         if (slot == 0u) {

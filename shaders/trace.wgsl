@@ -28,6 +28,39 @@ fn sum_of_lanes(local: u32, lanes: u32, own: vec4<f32>) -> vec4<f32> {
     return total;
 }
 
+// The pixels of a workgroup, of which so many threads share each: a tile that is as wide as high, or twice as wide, but of
+// whole words of codes in each row. Twin of `tile` in src/device/gpu/cuts.rs.
+fn tile_columns(lanes: u32) -> u32 {
+    return max(1u << ((countTrailingZeros(GROUP / lanes) + 1u) / 2u), CODES);
+}
+
+fn tile_rows(lanes: u32) -> u32 {
+    return GROUP / lanes / tile_columns(lanes);
+}
+
+// In Morton order where there is more than one row.
+fn place_in_tile(number: u32, lanes: u32) -> vec2<u32> {
+    if (tile_rows(lanes) == 1u) {
+        return vec2<u32>(number, 0u);
+    }
+    return vec2<u32>(even_bits(number), even_bits(number >> 1u));
+}
+
+// Codes are packed: four pixels of three bytes in three words; a row begins with a new word.
+const CODES: u32 = 4u;
+const CODE_WORDS: u32 = 3u;
+
+fn code_row_words() -> u32 {
+    return (CODE_WORDS * shot.size.x + CODES - 1u) / CODES;
+}
+
+// A word of codes of a row of the tile, whose first pixel has that number.
+fn code_word(first: u32, word: u32) -> u32 {
+    let pixel = first + word + word / CODE_WORDS;
+    let shift = 8u * (word % CODE_WORDS);
+    return (near_stack[pixel].x >> shift) | (near_stack[pixel + 1u].x << (24u - shift));
+}
+
 // Every other bit of a number of up to six, from the lowest on.
 fn even_bits(number: u32) -> u32 {
     return (number & 1u) | ((number >> 1u) & 2u) | ((number >> 2u) & 4u);
@@ -61,58 +94,57 @@ fn trace(
         waiting_thread = (group.y * groups.x + group.x) * GROUP + local;
         waiting_threads = groups.x * groups.y * GROUP;
     }
-    // a group's pixels lie in Morton order in a tile that is as wide as high, or twice as wide
     let lanes = slice.lanes;
     let number = local / lanes;
-    let bits = countTrailingZeros(GROUP / lanes);
-    let pixel = vec2<u32>(
-        (group.x << ((bits + 1u) / 2u)) + even_bits(number),
-        slice.first_row + (group.y << (bits / 2u)) + even_bits(number >> 1u),
-    );
+    let corner = vec2<u32>(group.x * tile_columns(lanes), slice.first_row + group.y * tile_rows(lanes));
+    let place = place_in_tile(number, lanes);
+    let pixel = corner + place;
     let is_inside = pixel.x < shot.size.x && pixel.y < min(shot.size.y, slice.end_row);
     if (is_inside) {
         add_samples(pixel, local % lanes, lanes);
     }
-    add_counts(local, group.y * groups.x + group.x);
     let samples = f32(shot.samples);
     let mean = sum_of_lanes(local, lanes, vec4<f32>(sum.rgb, sum.through)) / samples;
-    let has_pixel = is_inside && local % lanes == 0u;
+    let has_pixel = local % lanes == 0u;
     if (HAS_ALBEDO) {
         let mean_albedo = sum_of_lanes(local, lanes, vec4<f32>(sum.albedo, 0.0)) / samples;
-        if (has_pixel) {
-            let place = pixel.y * shot.size.x + pixel.x;
-            let first = FILM_WORDS * shot.size.x * shot.size.y + 3u * place;
+        if (is_inside && has_pixel) {
+            let first = FILM_WORDS * shot.size.x * shot.size.y + 3u * (pixel.y * shot.size.x + pixel.x);
             film[first] = bitcast<u32>(mean_albedo.x);
             film[first + 1u] = bitcast<u32>(mean_albedo.y);
             film[first + 2u] = bitcast<u32>(mean_albedo.z);
         }
     }
-    if (FILM_WORDS == 1u) {
-        if (has_pixel) {
+    clear_group_counts(local);
+    workgroupBarrier();
+    add_to_group_counts();
+    if (has_pixel) {
+        // row by row
+        let in_tile = place.y * tile_columns(lanes) + place.x;
+        if (FILM_WORDS == 1u) {
             let shown = mean.xyz * shot.gain;
-            film[pixel.y * shot.size.x + pixel.x] =
-                code_of(shown.x) | (code_of(shown.y) << 8u) | (code_of(shown.z) << 16u);
+            near_stack[in_tile].x = code_of(shown.x) | (code_of(shown.y) << 8u) | (code_of(shown.z) << 16u);
+        } else {
+            hand_over(in_tile, bitcast<vec4<u32>>(mean));
         }
-        return;
     }
+    workgroupBarrier();
+    add_group_counts(local, group.y * groups.x + group.x);
     // neighbours write words side by side: the film may lie beyond a bus that is slow for less
-    workgroupBarrier();
-    if (local % lanes == 0u) {
-        // by the pixel's place in the tile, row by row
-        let in_tile = (even_bits(number >> 1u) << ((bits + 1u) / 2u)) + even_bits(number);
-        hand_over(in_tile, bitcast<vec4<u32>>(mean));
-    }
-    workgroupBarrier();
-    let columns = 1u << ((bits + 1u) / 2u);
-    let corner = vec2<u32>(group.x * columns, slice.first_row + (group.y << (bits / 2u)));
-    let row_words = FILM_WORDS * columns;
-    for (var word = local; word < FILM_WORDS * GROUP / lanes; word += GROUP) {
-        let row = corner.y + word / row_words;
-        let column_word = word % row_words;
-        let is_in_row = corner.x + column_word / FILM_WORDS < shot.size.x;
-        if (is_in_row && row < min(shot.size.y, slice.end_row)) {
-            let place = handed_over(word / FILM_WORDS);
-            film[FILM_WORDS * (row * shot.size.x + corner.x) + column_word] = place[word % FILM_WORDS];
+    let columns = tile_columns(lanes);
+    let words = select(FILM_WORDS * columns, CODE_WORDS * columns / CODES, FILM_WORDS == 1u);
+    let row_words = select(FILM_WORDS * shot.size.x, code_row_words(), FILM_WORDS == 1u);
+    let first = words * group.x;
+    for (var word = local; word < words * tile_rows(lanes); word += GROUP) {
+        let row = corner.y + word / words;
+        let in_row = word % words;
+        if (first + in_row < row_words && row < min(shot.size.y, slice.end_row)) {
+            let at = row * row_words + first + in_row;
+            if (FILM_WORDS == 1u) {
+                film[at] = code_word(word / words * columns, in_row);
+            } else {
+                film[at] = handed_over(word / FILM_WORDS)[word % FILM_WORDS];
+            }
         }
     }
 }

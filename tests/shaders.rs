@@ -76,7 +76,7 @@ fn constants(bits: usize, film_words: u32) -> PipelineConstants {
 fn kinds(kernel: &str) -> Vec<PipelineConstants> {
     if kernel == "refit" {
         let with = |threads: u32| PipelineConstants::from_iter([(GROUP.to_string(), f64::from(threads))]);
-        return [8 * NODES_IN_GROUP, 16 * NODES_IN_GROUP].map(with).to_vec();
+        return [8 * NODES_IN_GROUP, 256, 512].map(with).to_vec();
     }
     let words = |bits| [1, 3, 4].map(|film_words| constants(bits, film_words));
     (0..1 << FLAGS.len()).flat_map(words).collect()

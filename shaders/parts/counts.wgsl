@@ -19,18 +19,22 @@ var<workgroup> group_counts: array<atomic<u32>, 5>;
 // Rows of counters that workgroups take in turn: all would wait for one.
 const COUNTER_ROWS: u32 = 256u;
 
-// Adds the threads' counts to the frame's. All threads of a workgroup must come here.
-fn add_counts(local: u32, group: u32) {
+// Adds the threads' counts to the frame's, in three steps with a barrier of the workgroup after each of the first two.
+fn clear_group_counts(local: u32) {
     if (local < 5u) {
         atomicStore(&group_counts[local], 0u);
     }
-    workgroupBarrier();
+}
+
+fn add_to_group_counts() {
     add_count(0u, traced.camera);
     add_count(1u, traced.shadow);
     add_count(2u, traced.mirrored);
     add_count(3u, traced.refracted);
     add_count(4u, traced.media_ignored);
-    workgroupBarrier();
+}
+
+fn add_group_counts(local: u32, group: u32) {
     if (local < 5u) {
         let more = atomicLoad(&group_counts[local]);
         if (more != 0u) {

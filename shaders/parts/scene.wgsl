@@ -234,8 +234,8 @@ override HAS_ONE_LIGHT: bool = false;
 override HAS_ALBEDO: bool = true;
 // Whether a thread takes one sample at most, of a path that ends at its first surface.
 override HAS_ONE_RAY: bool = false;
-// Words of the film for each pixel: 1 for codes of 8 bits on the sRGB curve, 3 for linear RGB, 4 with what the background
-// counts for.
+// Words of the film for each pixel: 3 for linear RGB, 4 with what the background counts for; 1 for codes of 8 bits on the sRGB
+// curve, which are packed.
 override FILM_WORDS: u32 = 4u;
 
 // Threads of a workgroup that traces.

@@ -82,8 +82,9 @@ fn enter(node: u32, ray: TracedRay, distance: f32) -> Entered {
     let low_xy = nodes[row + 2u];
     let low_z_high_x = nodes[row + 3u];
     let high_yz = nodes[row + 4u];
-    let exponents = vec3<u32>(head.w & 0xffu, (head.w >> 8u) & 0xffu, (head.w >> 16u) & 0xffu);
-    let step = bitcast<vec3<f32>>(exponents << vec3<u32>(23u)) * ray.inverse;
+    // each of three bytes to where a float has its exponent
+    let exponents = (vec3<u32>(head.w) << vec3<u32>(23u, 15u, 7u)) & vec3<u32>(INFINITE_BITS);
+    let step = bitcast<vec3<f32>>(exponents) * ray.inverse;
     let start = (bitcast<vec3<f32>>(head.xyz) - ray.origin) * ray.inverse;
     let slack = fma(abs(step), vec3<f32>(256.0), abs(start)) * 0.0000019073486328125;
     let near = start - slack;

@@ -121,34 +121,58 @@ pub(super) fn rays(
         &["1280x720, 1", "1920x1080, 1", "1280x720, 16", "1920x1080, 16"],
     );
     let sphere = poses(SPHERE).remove(0);
-    let mut all = vec![("sphere".to_string(), sphere.clone(), sphere_shot(&sphere, [8, 8], 1))];
+    let mut all = vec![("sphere".to_string(), sphere.clone(), vec![sphere_shot(&sphere, [8, 8], 1)])];
     for mesh in meshes.iter().filter(|m| m.name != "sheet") {
         let frame = Frame { objects: vec![Object { geometry: Arc::clone(&mesh.geometry), transform: None }] };
-        let mut shot = sphere_shot(&frame, [8, 8], 1);
-        if let Some(View { eye, look_at, fov_deg }) = mesh.view {
-            let point = |p: [f32; 3]| Vec3::from(p).as_dvec3();
-            let (eye, look_at) = (point(eye), point(look_at));
-            shot.camera = Camera { eye, look_at, up: DVec3::Y, fov_deg: fov_deg.into() };
-            // a lamp beside the eye, so that what is seen is lit
-            let beside = shot.camera.axes().1 * 0.1 * (look_at - eye).length();
-            shot.lights = vec![lamp((eye + beside).as_vec3())];
-        }
-        // what of it materials and textures cost
+        let shot = sphere_shot(&frame, [8, 8], 1);
         let grey = (!mesh.geometry.materials.is_empty()).then(|| grey(&mesh.geometry));
-        all.push((mesh.name.clone(), frame, shot.clone()));
-        all.extend(grey.map(|frame| (format!("{}, grey", mesh.name), frame, shot)));
+        let shots = mesh.view.map_or_else(|| shot.clone(), |view| from_inside(&shot, view));
+        all.push((mesh.name.clone(), frame.clone(), vec![shots.clone()]));
+        // what of it materials and textures cost
+        all.extend(grey.clone().map(|frame| (format!("{}, grey", mesh.name), frame, vec![shots])));
+        if mesh.view.is_some() {
+            // what of it this one view is
+            let frame = grey.unwrap_or(frame);
+            let around = all_around(&mesh.geometry).map(|view| from_inside(&shot, view)).collect();
+            all.push((format!("{}, grey, all around from its middle", mesh.name), frame, around));
+        }
     }
-    for (name, frame, shot) in all {
+    for (name, frame, shots) in all {
         let mut cells = [Cell::Absent; SHOTS.len()];
         for (cell, (size, samples)) in cells.iter_mut().zip(SHOTS) {
-            let shot = Shot { size, samples, ..shot.clone() };
-            let output = Output::Codes { exposure_stops: 0.0 };
-            let ran = run(device, std::slice::from_ref(&frame), &shot, output, bench.rounds(20), 1)?;
-            *cell = Spread::of(ran.trace_ms).map(|ms| ran.rays as f64 / ms.median * 1e-6).into();
+            let (mut rays, mut ms) = (0, 0.0);
+            for shot in &shots {
+                let shot = Shot { size, samples, ..shot.clone() };
+                let output = Output::Codes { exposure_stops: 0.0 };
+                let ran = run(device, std::slice::from_ref(&frame), &shot, output, bench.rounds(20), 1)?;
+                rays += ran.rays;
+                ms += Spread::of(ran.trace_ms).map_or(f64::NAN, |ms| ms.median);
+            }
+            *cell = (rays as f64 / ms * 1e-6).into();
         }
-        table.row(name, [cells[0], cells[1], cells[2], cells[3]]);
+        table.row(name, cells);
     }
     Ok(table)
+}
+
+/// A shot from inside a room, with a lamp beside the eye, so that what is seen is lit.
+fn from_inside(shot: &Shot, View { eye, look_at, fov_deg }: View) -> Shot {
+    let point = |p: [f32; 3]| Vec3::from(p).as_dvec3();
+    let (eye, look_at) = (point(eye), point(look_at));
+    let camera = Camera { eye, look_at, up: DVec3::Y, fov_deg: fov_deg.into() };
+    let beside = camera.axes().1 * 0.1 * (look_at - eye).length();
+    let lights = vec![lamp((eye + beside).as_vec3())];
+    Shot { camera, lights, ..shot.clone() }
+}
+
+/// Eight level views from the middle of a mesh's box.
+fn all_around(geometry: &Geometry) -> impl Iterator<Item = View> {
+    let (middle, diagonal) = extent(geometry);
+    (0..8).map(move |i| {
+        let angle = PI / 4.0 * i as f32;
+        let ahead = Vec3::new(libm::cosf(angle), 0.0, libm::sinf(angle)) * (diagonal / 4.0);
+        View { eye: middle.into(), look_at: (middle + ahead).into(), fov_deg: 60.0 }
+    })
 }
 
 /// A mesh without its materials.

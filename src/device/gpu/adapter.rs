@@ -7,7 +7,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 const STORAGE_BUFFERS: u32 = 16;
 /// Threads of the largest workgroup, and bytes that they share.
 pub(super) const GROUP_THREADS: u32 = 256;
-const GROUP_BYTES: u32 = 10_240;
+const GROUP_BYTES: u32 = 28 * GROUP_THREADS;
 /// What is better: twice as many.
 const TOP_THREADS: u32 = 512;
 /// The least storage binding that is worth it.

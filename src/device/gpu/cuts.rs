@@ -9,6 +9,9 @@ pub(super) const GROUP: u32 = 64;
 /// Threads that take one pixel's samples side by side at most.
 pub(super) const LANES_MOST: u32 = 16;
 
+/// Pixels whose codes are packed into whole words.
+pub(super) const CODES: u32 = 4;
+
 /// Rows of the picture that one dispatch traces.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct Cut {
@@ -46,10 +49,12 @@ impl Pace {
     }
 }
 
-/// The pixels of a workgroup where so many threads share one: a tile of so many columns and rows.
+/// The pixels of a workgroup where so many threads share one: a tile of so many columns and rows. Twin of `tile_columns` and
+/// `tile_rows` in shaders/trace.wgsl.
 pub(super) fn tile(lanes: u32) -> [u32; 2] {
-    let bits = (GROUP / lanes).ilog2();
-    [1 << bits.div_ceil(2), 1 << (bits / 2)]
+    let pixels = GROUP / lanes;
+    let columns = (1 << pixels.ilog2().div_ceil(2)).max(CODES);
+    [columns, pixels / columns]
 }
 
 /// Cuts a picture into so many rows at most, whole tiles each; one row of tiles at least.

@@ -16,6 +16,8 @@ pub(super) const COUNTERS: u64 = COUNTER_ROWS * COUNTER_ROW;
 pub(super) const INSTANTS: u64 = 4;
 /// Storage bindings begin at multiples of this on every adapter.
 const ALIGNMENT: u64 = 256;
+/// Bytes that are copied as one.
+const BLOCK: usize = 64;
 /// Pixels that one thread takes out together.
 const GRAIN: usize = 1 << 15;
 
@@ -34,7 +36,12 @@ pub(super) struct Layout {
 impl Layout {
     pub(super) fn new(shot: &Shot, output: Output, has_albedo: bool, fits: u64) -> Self {
         let pixels = u64::from(shot.size[0]) * u64::from(shot.size[1]);
-        let words_each = u64::from(film_words(shot, output)) + if has_albedo { 3 } else { 0 };
+        let film_bytes = match output {
+            Output::Codes { .. } => code_row_bytes(shot.size[0]) * u64::from(shot.size[1]),
+            Output::Linear => {
+                4 * pixels * (u64::from(film_words(shot, output)) + if has_albedo { 3 } else { 0 })
+            }
+        };
         let mut end = 0_u64;
         let mut section = |bytes: u64| {
             let start = end.next_multiple_of(ALIGNMENT);
@@ -42,7 +49,7 @@ impl Layout {
             start..end
         };
         Self {
-            film: section(4 * words_each * pixels),
+            film: section(film_bytes),
             center: section(if wants_center(shot) { 4 * CENTER_WORDS * pixels } else { 0 }),
             counters: section(4 * COUNTERS),
             instants: section(8 * INSTANTS),
@@ -82,7 +89,7 @@ pub(super) fn take_out(
     let of = |range: &Range<u64>| &bytes[range.start as usize..range.end as usize];
     let words = |range: &Range<u64>| bytemuck::cast_slice::<u8, u32>(of(range));
     let film = pool.install(|| match output {
-        Output::Codes { .. } => Film::of_codes(shot.size, codes(words(&layout.film))),
+        Output::Codes { .. } => Film::of_codes(shot.size, codes(of(&layout.film), shot.size[0])),
         Output::Linear => {
             let floats: &[f32] = bytemuck::cast_slice(of(&layout.film));
             let pixels = shot.size[0] as usize * shot.size[1] as usize;
@@ -108,14 +115,27 @@ pub(super) fn take_out(
     (film, Facts { rays: ray_counts(words(&layout.counters)), instants, costs })
 }
 
-/// Three bytes a pixel of words of which each is one.
-fn codes(words: &[u32]) -> Vec<u8> {
-    let code = |word: &u32| {
-        let [r, g, b, _] = word.to_le_bytes();
-        [r, g, b]
-    };
-    // collected, not filled in: zeros would be written first
-    words.par_iter().with_min_len(GRAIN).map(code).collect::<Vec<[u8; 3]>>().into_flattened()
+/// Bytes of a row of codes: three a pixel, and what fills its last word.
+fn code_row_bytes(width: u32) -> u64 {
+    4 * (3 * u64::from(width)).div_ceil(4)
+}
+
+/// Codes without what fills words.
+fn codes(bytes: &[u8], width: u32) -> Vec<u8> {
+    let (row, row_bytes) = (3 * width as usize, code_row_bytes(width) as usize);
+    if row == row_bytes {
+        // collected, not filled in: zeros would be written first
+        let (blocks, rest) = bytes.as_chunks::<BLOCK>();
+        let blocks = blocks.par_iter().with_min_len(GRAIN * 3 / BLOCK).copied();
+        let mut codes = blocks.collect::<Vec<[u8; BLOCK]>>().into_flattened();
+        codes.extend_from_slice(rest);
+        return codes;
+    }
+    let mut codes = Vec::with_capacity(bytes.len());
+    for bytes in bytes.chunks_exact(row_bytes) {
+        codes.extend_from_slice(&bytes[..row]);
+    }
+    codes
 }
 
 /// Linear RGB and what the background counts for.

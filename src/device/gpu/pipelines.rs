@@ -1,7 +1,8 @@
 //! Kernels made ready: layouts of bindings, and a pipeline for each set of what frames have.
 
-use super::adapter::{GROUP_THREADS, Gpu};
+use super::adapter::Gpu;
 use super::cache::Compiled;
+use super::records::NODES_IN_GROUP;
 use super::scene::Has;
 use super::shaders::{self, Access};
 use crate::store::Store;
@@ -55,7 +56,7 @@ impl Pipelines {
             pipeline(gpu, cache, &refit_pipelines, &refit, entry, &[(shaders::GROUP, f64::from(threads))])
         };
         Self {
-            refit_level: fit("refit_level", GROUP_THREADS),
+            refit_level: fit("refit_level", 8 * NODES_IN_GROUP),
             refit_top: fit("refit_top", gpu.top_threads),
             modules: HashMap::new(),
             trace_layout,

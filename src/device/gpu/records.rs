@@ -13,8 +13,8 @@ pub const CENTER_WORDS: u64 = 12;
 pub const COUNTER_ROWS: u64 = 256;
 /// Rows of four words that a waiting ray takes.
 pub const WAITING_ROWS: u64 = 10;
-/// Nodes that a workgroup fits.
-pub const NODES_IN_GROUP: u32 = 32;
+/// Nodes that a workgroup fits, below the tops of trees.
+pub const NODES_IN_GROUP: u32 = 8;
 
 /// Everything but the geometry that bears on a frame's film.
 #[allow(missing_docs, reason = "said in shaders/parts/scene.wgsl")]
