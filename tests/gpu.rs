@@ -374,7 +374,7 @@ fn pictures_of_run(input: &Path, out: &Path, device: Box<dyn Device>) -> BTreeMa
     })
     .unwrap();
     let options = RunOptions { threads: 2, keeps_reports: true, ..RunOptions::default() };
-    let outcome = render(&job, &options, device, &Stop::default(), &mut |_| {}).unwrap();
+    let outcome = render(&job, &options, &mut [device], &Stop::default(), &mut |_| {}).unwrap();
     let failed: Vec<_> = outcome.failed().map(|f| &f.error).collect();
     assert!(failed.is_empty(), "{failed:?}");
     let entries = std::fs::read_dir(out).unwrap().map(|e| e.unwrap().path());

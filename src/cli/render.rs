@@ -17,7 +17,7 @@ use std::sync::Arc;
 pub(super) fn render(args: &RenderArgs, global: &Global) -> Result<ExitCode> {
     let job = job::resolve(&request::request(args)?)?;
     let options = run_options(args);
-    let device = device(args, &options)?;
+    let mut devices = [device(args, &options)?];
     if args.dry_run {
         dry_run(&job, global);
         return Ok(ExitCode::SUCCESS);
@@ -27,7 +27,7 @@ pub(super) fn render(args: &RenderArgs, global: &Global) -> Result<ExitCode> {
     let kind = if json || global.quiet && for_people { ProgressKind::None } else { args.progress };
     let mut progress = Progress::new(kind, global.verbose);
     let stop = stop::on_signals()?;
-    let outcome = run::render(&job, &options, device, &stop.asked, &mut |event| {
+    let outcome = run::render(&job, &options, &mut devices, &stop.asked, &mut |event| {
         if json {
             println!("{}", event_json(event));
         } else if !(global.quiet && matches!(event, Event::Warning(_))) {

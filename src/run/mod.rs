@@ -135,15 +135,16 @@ struct Shown {
     status: Status,
 }
 
-/// Renders a job on a device. `on_event` is called on this thread.
+/// Renders a job on devices. `on_event` is called on this thread.
 pub fn render(
     job: &Job,
     options: &RunOptions,
-    mut device: Box<dyn Device>,
+    devices: &mut [Box<dyn Device>],
     stop: &Stop,
     on_event: &mut dyn FnMut(&Event),
 ) -> Result<Outcome, RunError> {
     let since = Stopwatch::start();
+    let device = &mut *devices[0];
     let records = Records::read(&job.folder)?;
     check::nothing_is_lost(job, &records, options)?;
     clean_up(job);
@@ -182,11 +183,11 @@ pub fn render(
         }
         drop(to_device);
         {
-            let (note, flight, device) = (note.clone(), &flight, &mut device);
+            let (note, flight, device) = (note.clone(), &flight, &mut *device);
             scope.spawn(move || {
                 let frames = job.pictures.len();
                 trace::device_stage(
-                    &mut **device,
+                    device,
                     options,
                     frames,
                     &from_readers,

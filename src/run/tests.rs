@@ -40,7 +40,7 @@ fn run(request: &Request, faults: &[(usize, Fault)], options: &RunOptions) -> Ou
         .unwrap();
         device = device.with_fault(frame.hash(), fault);
     }
-    render(&job, options, Box::new(device), &Stop::default(), &mut |_| {}).unwrap()
+    render(&job, options, &mut [Box::new(device)], &Stop::default(), &mut |_| {}).unwrap()
 }
 
 fn two_threads() -> RunOptions {
@@ -106,7 +106,7 @@ fn a_run_that_is_told_to_stop_before_it_begins_makes_nothing() {
     let stop = Stop::default();
     stop.ask();
     let device = Box::new(FakeDevice::new("fake", 1 << 20));
-    let outcome = render(&job, &two_threads(), device, &stop, &mut |_| {}).unwrap();
+    let outcome = render(&job, &two_threads(), &mut [device], &stop, &mut |_| {}).unwrap();
     assert!(outcome.stopped && outcome.report.frames.is_empty() && !t.path().join("out").exists());
 }
 
@@ -140,7 +140,7 @@ fn a_picture_that_is_gone_at_the_end_is_told_of_with_and_without_a_report() {
                 }
             };
             let device = Box::new(FakeDevice::new("fake", 1 << 20));
-            render(&job, &options, device, &Stop::default(), &mut on_event).unwrap()
+            render(&job, &options, &mut [device], &Stop::default(), &mut on_event).unwrap()
         };
         assert_eq!(told.last(), Some(&(Some(2), Status::Failed)));
         let failed: Vec<_> = outcome.failed().collect();

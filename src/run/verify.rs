@@ -57,7 +57,7 @@ pub fn verify<E: From<RunError>>(
     let mut run = |way: Way| -> Result<Outcome, E> {
         let job = job_of(job, way, &room.path().join(way.name));
         let options = RunOptions { cold: way.cold, report: None, overwrite: false, ..options.clone() };
-        Ok(render(&job, &options, device()?, stop, &mut |event| on_event(&way, event))?)
+        Ok(render(&job, &options, &mut [device()?], stop, &mut |event| on_event(&way, event))?)
     };
     let first = run(WAYS[0])?;
     if first.stopped {
