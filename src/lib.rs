@@ -8,6 +8,7 @@
 //! | [`cli`] | what was typed, what it means, a call below; the only room that prints |
 //! | [`mod@bench`] | workloads, timing, peers, charts |
 //! | [`run`] | a run: reader, device and writer stages, resume, events, report; warm against cold |
+//! | [`schedule`] | frames to devices: estimates, policies, a simulation of them (pure) |
 //! | [`device`] | the device trait, the CPU, GPUs (wgpu), the fake device, the conformance suite, the registry |
 //! | [`kernel`] | camera rays, materials, lights, sampling: what one ray does |
 //! | [`plan`] | what a device must do before it can trace a frame, as a value (pure) |
@@ -40,5 +41,6 @@ pub mod output;
 pub mod plan;
 pub mod run;
 pub mod scene;
+pub mod schedule;
 pub mod store;
 pub mod warning;
