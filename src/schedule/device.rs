@@ -10,6 +10,8 @@ pub(super) struct Device {
     pub(super) is_present: bool,
     /// How many times longer it takes than its kind is thought to take.
     pub(super) slowness: f64,
+    /// The same of cold starts.
+    pub(super) start_slowness: f64,
     /// The job that it takes its runs from.
     pub(super) serving: Option<Serving>,
     /// Jobs whose scenes it holds; those that have ended are dropped in passing.
@@ -32,7 +34,15 @@ pub(super) struct Serving {
 
 impl Device {
     pub(super) fn new(facts: DeviceFacts) -> Self {
-        Self { facts, is_present: true, slowness: 1.0, serving: None, resident: Vec::new(), held: Vec::new() }
+        Self {
+            facts,
+            is_present: true,
+            slowness: 1.0,
+            start_slowness: 1.0,
+            serving: None,
+            resident: Vec::new(),
+            held: Vec::new(),
+        }
     }
 
     pub(super) fn serves(&self, job: JobId) -> bool {

@@ -14,7 +14,7 @@ pub(super) enum Place {
     /// Nobody serves it.
     Waiting(Key),
     /// It is served and another device may help.
-    Joinable(Key),
+    Joinable(Key, Key),
 }
 
 /// What a job costs on a kind of device, and how often that was measured.
@@ -53,6 +53,8 @@ pub(super) struct Job {
     pub(super) served_s: f64,
     /// Seconds that it takes alone.
     pub(super) alone_s: f64,
+    /// What it adds to the seconds of work that are left.
+    pub(super) work_s: f64,
     pub(super) helpers: usize,
     /// Frames a second of those who serve it.
     rate: f64,
@@ -86,6 +88,7 @@ impl Job {
             traced: 0,
             served_s,
             alone_s,
+            work_s: 0.0,
             helpers: 0,
             rate: 0.0,
             cold_rate: 0.0,

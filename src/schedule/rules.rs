@@ -3,21 +3,19 @@
 /// What the rules weigh.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Weights {
-    /// How many seconds of others' waiting a second of a cold start is worth: φ.
+    /// Affinity against balance: how many times a cold start counts in a job's key; φ. At 1 jobs stand in the order of
+    /// what they take alone.
     pub phi: f64,
-    /// A device that joins does at least so many times the work that its cold start costs: β.
-    pub beta: f64,
-    /// How much what others lose by a second copy counts beside what the job gains by it: γ.
+    /// How many times what all jobs lose by another copy counts beside what one gains by it; γ. At 1 the sum of all
+    /// slowdowns is least, were the loss spread evenly; greater, fewer copies are made and the last job ends sooner.
     pub price: f64,
-    /// EXPERIMENT
-    pub mode: u32,
     /// How long a run of frames takes, at most, in seconds.
     pub batch_s: f64,
 }
 
 impl Default for Weights {
     fn default() -> Self {
-        Self { phi: 4.0, beta: 2.0, price: 16.0, mode: 0, batch_s: 0.1 }
+        Self { phi: 1.0, price: 16.0, batch_s: 0.1 }
     }
 }
 
@@ -51,14 +49,9 @@ impl Served {
         cold_s + warm_s > self.ends_s() + self.slowest_s
     }
 
-    /// Join test: the time that tracing takes, at least `beta` times the cold start; and what the job gains by it, in
-    /// terms of its own length, is at least what all that wait lose while the device makes another copy.
-    ///
-    /// A device's `cold_s` make the `devices` that there are poorer by `cold_s / devices` seconds: every waiting job
-    /// ends so much later, which is `pressure * cold_s / devices` as the sum over them of 1/(seconds alone).
-    pub(super) fn pays(&self, warm_s: f64, cold_s: f64, beta: f64, price_s: f64) -> bool {
-        let joined_s = self.joined_s(warm_s, cold_s);
-        joined_s - cold_s >= beta * cold_s && self.ends_s() - joined_s >= price_s
+    /// Join test: the seconds by which a job ends sooner with one more device; below 0 where that would be later.
+    pub(super) fn gains_s(&self, warm_s: f64, cold_s: f64) -> f64 {
+        self.ends_s() - self.joined_s(warm_s, cold_s)
     }
 }
 

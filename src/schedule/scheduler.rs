@@ -19,12 +19,14 @@ const SLOWNESS_GAIN: f64 = 0.3;
 /// job begins at the system's virtual time v, which grows by a second for each second of service over the sum of all
 /// weights, and finishes when its own work over its weight is done. Of jobs that come together the shortest is first.
 ///
-/// **Nothing waits for ever.** A job's key K (finish time and φ times its cold start) stays as it is while it waits, but
-/// for what is learnt and appended. A job that comes once v ≥ K has a greater finish time and key. So only work that came
-/// before v reached K goes before it. v reaches K: with weights of active jobs that sum up to A(t) and devices of which
-/// at least one works while a job waits, v grows at 1/A(t) a second or faster; even where more comes than can be served,
-/// A grows no faster than jobs come, linearly, and the integral of 1/A has no bound. With at most n jobs of weight 1
-/// active, a job waits no longer than n·(W + φc) seconds of service, and those that came before.
+/// **Nothing waits for ever.** A job's key K = v₀ + (W + φPc)/p (v₀ the virtual time when it came, W its seconds of work, c
+/// its cold start, P devices, p its weight) stays as it is while it waits, but for what is learnt and appended. A job that
+/// comes once v ≥ K has a greater finish time, hence key, and a device that falls free takes from the least key of
+/// what it holds and what waits. So only work that came before v reached K goes before it, a batch on each device aside.
+/// v reaches K: while it waits the soonest device that fits works, so v grows by 1/A for each second of service, A the
+/// sum of the active weights. With P equal devices and at most n active jobs of weight 1, v has grown by (W + φPc) after
+/// n·(W/P + φc) seconds: n times what the job would take alone. Even where more comes than can ever be served, A grows no
+/// faster than jobs come, linearly in time, and the integral of 1/A has no bound.
 #[derive(Clone, Debug)]
 pub struct Scheduler {
     pub(super) policy: Policy,
@@ -38,9 +40,10 @@ pub struct Scheduler {
     pub(super) virtual_s: f64,
     pub(super) active_weight: f64,
     pub(super) active: usize,
-    /// The sum of 1/(seconds alone) of jobs that wait.
+    /// Seconds until all that there is would be traced, were nothing lost.
+    pub(super) work_s: f64,
+    /// The sum of 1/(seconds alone) of active jobs.
     pub(super) pressure: f64,
-    pub(super) waiting: usize,
 }
 
 /// Devices that are equal, and the orders in which jobs stand for them.
@@ -50,6 +53,8 @@ pub(super) struct Kind {
     pub(super) budget_bytes: u64,
     pub(super) waiting: BTreeSet<(Key, usize)>,
     pub(super) joinable: BTreeSet<(Key, usize)>,
+    /// The same jobs, the one that ends last first.
+    pub(super) last: BTreeSet<(Key, usize)>,
 }
 
 impl Scheduler {
@@ -76,8 +81,8 @@ impl Scheduler {
             virtual_s: 0.0,
             active_weight: 0.0,
             active: 0,
+            work_s: 0.0,
             pressure: 0.0,
-            waiting: 0,
         }
     }
 
@@ -134,7 +139,14 @@ impl Scheduler {
             one.learns_warm(facts.kind, warm_s.clamp(1e-6, 1e6), 1.0);
         }
         if let Some(cold_s) = cold_s.filter(|s| s.is_finite()) {
-            one.learns_cold(facts.kind, cold_s.clamp(0.0, 1e6), START_GAIN);
+            let facing = &mut self.devices[device];
+            let known_s = one.estimates[facts.kind].costs.cold_s * facing.start_slowness;
+            if known_s > 0.0 && cold_s > 0.0 {
+                let slowness = facing.start_slowness * (cold_s / known_s).powf(SLOWNESS_GAIN);
+                facing.start_slowness = slowness.clamp(1e-3, 1e3);
+            }
+            let usual_s = cold_s / facing.start_slowness;
+            one.learns_cold(facts.kind, usual_s.clamp(0.0, 1e6), START_GAIN);
         }
         self.place(job.0, now_s);
     }
@@ -271,7 +283,7 @@ impl Scheduler {
     pub fn device_back(&mut self, device: usize) {
         let facing = &mut self.devices[device];
         if !facing.is_present {
-            (facing.is_present, facing.slowness) = (true, 1.0);
+            (facing.is_present, facing.slowness, facing.start_slowness) = (true, 1.0, 1.0);
             self.kinds[facing.facts.kind].present += 1;
         }
     }
@@ -308,7 +320,7 @@ impl Scheduler {
     pub(super) fn costs(&self, device: usize, job: usize) -> (f64, f64) {
         let facing = &self.devices[device];
         let costs = self.jobs[job].as_ref().map(|one| one.estimates[facing.facts.kind].costs);
-        costs.map_or((1.0, 0.0), |c| (c.warm_s * facing.slowness, c.cold_s))
+        costs.map_or((1.0, 0.0), |c| (c.warm_s * facing.slowness, c.cold_s * facing.start_slowness))
     }
 
     pub(super) fn fits(&self, device: usize, job: &Job) -> bool {

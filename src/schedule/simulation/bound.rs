@@ -27,9 +27,11 @@ pub fn alone_s(job: &TraceJob, devices: &[TraceDevice]) -> f64 {
 /// - *A job*: it comes, and takes no less than alone.
 /// - *Work*: take the jobs that come at `a` or later and have more than `b` bytes. Only devices whose budgets are greater
 ///   serve them, and not before `a`. In seconds of speed 1 every frame takes `warm` wherever it is traced, and every job
-///   is made resident at least once, which takes no less than the least of `cold · cold_factor · speed` over those
-///   devices. A device does `speed` such seconds a second until it fails, fewer after it has slowed down. So the sum of
-///   their work up to T is at least the sum of what is to be done.
+///   is made resident at least once, somewhere: that takes `cold · cold_factor · speed` of them there. A device does `speed`
+///   such seconds a second until it fails, fewer after it has slowed down. Let cold starts be divided among devices as
+///   finely as one likes, which only helps: then least work is spent in them where the devices of the least
+///   `cold_factor · speed` do as many as they have time for (otherwise two devices could exchange cold starts for frames
+///   and both gain). What all can do besides, up to T, is no less than the frames.
 /// - *First starts*: as before, but cold starts count by devices: one that traces at all spends, before its first frame,
 ///   at least the shortest cold start of those jobs there; this is what binds where there are fewer jobs than devices.
 pub fn bound_s(trace: &Trace) -> f64 {
@@ -57,10 +59,20 @@ fn of_some(jobs: &[&TraceJob], devices: &[&TraceDevice], from_s: f64) -> f64 {
     }
     let frames: f64 = jobs.iter().map(|j| j.frames as f64 * j.warm_s).sum();
     let start = |d: &TraceDevice| d.cold_factor() * d.speed;
-    let least_start = devices.iter().map(|d| start(d)).fold(f64::INFINITY, f64::min);
-    let starts: f64 = jobs.iter().map(|j| j.cold_s * least_start).sum();
+    let starts: f64 = jobs.iter().map(|j| j.cold_s).sum();
+    let mut devices = devices.to_vec();
+    devices.sort_by(|a, b| start(a).total_cmp(&start(b)));
     let shortest = jobs.iter().map(|j| j.cold_s).fold(f64::INFINITY, f64::min);
-    let work = |t_s: f64| devices.iter().map(|d| done(d, from_s, t_s)).sum::<f64>() >= frames + starts;
+    let work = |t_s: f64| {
+        let (mut to_start, mut traced) = (starts, 0.0);
+        for device in &devices {
+            let done = done(device, from_s, t_s);
+            let started = to_start.min(done / start(device));
+            to_start -= started;
+            traced += done - started * start(device);
+        }
+        to_start <= 1e-9 && traced >= frames
+    };
     let first = |t_s: f64| {
         let traced = |d: &&&TraceDevice| (done(d, from_s, t_s) - shortest * start(d)).max(0.0);
         devices.iter().map(|d| traced(&d)).sum::<f64>() >= frames
