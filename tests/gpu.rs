@@ -49,7 +49,7 @@ fn open(adapter: &Adapter) -> GpuDevice {
 fn picture_as(device: &mut dyn Device, frame: &Frame, shot: &Shot, wishes: &Wishes) -> Film {
     let plan = plan_frame(frame, device.residency(), wishes);
     device.apply(&plan, frame).expect("the budget is ample");
-    device.trace(frame, shot, &Stop::default()).expect("it is resident").film
+    device.trace(frame, shot, &Stop::default()).expect("it is resident").film.into_film()
 }
 
 fn picture(device: &mut dyn Device, frame: &Frame, shot: &Shot) -> Film {
@@ -320,6 +320,15 @@ fn a_lost_gpu_says_so_once_and_begins_anew() {
         gpu.lose();
         is_lost("finish", gpu.finish().err());
         again(&mut gpu, "finish");
+
+        // what was traced before is not lost
+        gpu.apply(&plan(&gpu), frame).unwrap();
+        gpu.begin(frame, shot, Output::Linear, &Stop::default()).unwrap();
+        let film = gpu.finish().unwrap().film;
+        assert!(!film.is_developed());
+        gpu.lose();
+        is_lost("apply", gpu.apply(&plan(&gpu), frame).err());
+        assert!(bytes(&film) == right, "a film went with its device");
     }
 }
 
@@ -422,7 +431,8 @@ fn codes_of_gpus_are_those_of_the_linear_film() {
             for exposure_stops in [0.0, -1.5, 2.25] {
                 let output = Output::Codes { exposure_stops };
                 gpu.begin(&scene.frame, &scene.shot, output, &Stop::default()).unwrap();
-                let codes = gpu.finish().unwrap().film.codes.expect("nothing else is wanted of the film");
+                let codes =
+                    gpu.finish().unwrap().film.into_film().codes.expect("nothing else is wanted of the film");
                 let right = quantize8(&linear.rgb, None, exposure_stops);
                 assert!(codes == right, "{}: {} at {exposure_stops}", adapter.name(), scene.name);
             }

@@ -118,7 +118,7 @@ fn a_cold_plan_forgets_everything(make: Make) {
     let bytes: u64 = frame.objects[0].geometry.parts().iter().map(|(_, bytes)| bytes).sum();
     assert_eq!(cost.uploaded_bytes, bytes, "a cold plan uploads all");
     let cold = device.trace(frame, &shot(), &Stop::default()).expect("it is resident");
-    assert!(cold.film == warm, "the cold picture differs");
+    assert!(*cold.film == warm, "the cold picture differs");
 }
 
 /// Frames whose faces differ take turns: with space each is loaded once; without, something is evicted each time, the
@@ -139,7 +139,7 @@ fn what_comes_again_is_kept_while_there_is_space(make: Make) {
             uploaded.push(device.apply(&plan, frame).expect("each frame fits").uploaded_bytes);
             assert!(device.residency().bytes() <= budget_bytes, "more is held than is allowed");
             let traced = device.trace(frame, &shot(), &Stop::default()).expect("it is resident");
-            assert!(traced.film == *cold, "the picture of a frame that came again differs");
+            assert!(*traced.film == *cold, "the picture of a frame that came again differs");
         }
         uploaded
     };
@@ -210,7 +210,7 @@ fn a_frame_that_is_not_resident_is_refused(make: Make) {
 fn picture(device: &mut dyn Device, frame: &Frame) -> Film {
     let plan = plan_frame(frame, device.residency(), &Wishes::default());
     device.apply(&plan, frame).expect("the budget suffices");
-    device.trace(frame, &shot(), &Stop::default()).expect("it is resident").film
+    device.trace(frame, &shot(), &Stop::default()).expect("it is resident").film.into_film()
 }
 
 /// A picture of odd size with several samples, all auxiliary pictures, and lights of each kind.

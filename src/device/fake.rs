@@ -141,11 +141,10 @@ impl Device for FakeDevice {
         let mut film = Film::new(shot.size, shot.alpha, shot.aovs);
         film.rgb.fill(color_of(frame, shot));
         self.traced = Some(Traced {
-            film,
+            film: film.into(),
             rays: RayCounts::default(),
             trace_ms: 0.0,
             update_ms: None,
-            readback_ms: None,
             spans: Spans::default(),
         });
         Ok(())

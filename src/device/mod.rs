@@ -9,7 +9,7 @@ pub mod registry;
 
 pub use crate::kernel::RayCounts;
 
-use crate::film::Film;
+use crate::film::LatentFilm;
 use crate::plan::{Residency, UpdatePlan};
 use crate::scene::{Frame, Shot};
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -116,16 +116,14 @@ pub enum Output {
 /// A traced frame and what it cost.
 #[derive(Debug)]
 pub struct Traced {
-    /// The picture, linear.
-    pub film: Film,
+    /// The picture.
+    pub film: LatentFilm,
     /// Rays.
     pub rays: RayCounts,
     /// Tracing and shading, ms.
     pub trace_ms: f64,
     /// Fitting trees for this frame, ms, where the device does that when it traces.
     pub update_ms: Option<f64>,
-    /// Bringing the film back, ms; None where it need not be.
-    pub readback_ms: Option<f64>,
     /// When it fitted trees and when it traced, by its own clock; where it has one.
     pub spans: Spans,
 }

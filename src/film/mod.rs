@@ -3,9 +3,11 @@
 pub mod color;
 pub mod compare;
 mod flip;
+mod latent;
 pub mod quantize;
 
 pub use color::{Srgb8, gain_from_stops};
+pub use latent::LatentFilm;
 
 use crate::scene::{Aov, AovSet};
 use std::borrow::Cow;

@@ -23,7 +23,7 @@ pub use source::Sources;
 
 use crate::clock::Stopwatch;
 use crate::device::{Device, DeviceKind, Stop};
-use crate::film::Film;
+use crate::film::LatentFilm;
 use crate::job::Job;
 use crate::output::{self, OutputError, Records, RunLog};
 use crate::plan::Update;
@@ -129,7 +129,7 @@ enum Note {
 
 /// A traced frame on its way to its file.
 struct Shown {
-    film: Arc<Film>,
+    film: Arc<LatentFilm>,
     read: ReadFrame,
     /// Rendered, or copied.
     status: Status,

@@ -9,7 +9,7 @@ use super::{Note, RunOptions, Shown, panic_text};
 use crate::clock::Stopwatch;
 use crate::device::{Device, DeviceError, Output, Stop, Traced, UpdateCost};
 use crate::diff::changes;
-use crate::film::Film;
+use crate::film::LatentFilm;
 use crate::kernel::media::MEDIA_MAX;
 use crate::plan::{Action, Update, Wishes, plan_frame};
 use crate::scene::{Frame, PartHash};
@@ -124,7 +124,7 @@ struct UnderWay {
 struct Before {
     frame: Arc<Frame>,
     fingerprint: PartHash,
-    film: Option<Arc<Film>>,
+    film: Option<Arc<LatentFilm>>,
 }
 
 /// Why there is no film: an error of the device, or the text of a panic.
@@ -255,7 +255,7 @@ impl DeviceStage<'_> {
         let _ = self.ends.note.send(Note::Frame(read.report));
     }
 
-    fn shown(&mut self, film: Arc<Film>, status: Status, read: ReadFrame, bytes: u64) {
+    fn shown(&mut self, film: Arc<LatentFilm>, status: Status, read: ReadFrame, bytes: u64) {
         self.ends.flight.give_bytes(bytes);
         self.tell();
         // the writers outlive this stage
@@ -313,7 +313,6 @@ impl DeviceStage<'_> {
         }
         report.rays = traced.rays.into();
         report.ms.trace = Some(traced.trace_ms);
-        report.ms.readback = traced.readback_ms;
     }
 }
 

@@ -26,6 +26,11 @@ pub(super) fn write_stage(log: &RunLog, films: &Mutex<Receiver<Shown>>, note: &S
 }
 
 fn write_frame(log: &RunLog, shown: &mut Shown) -> Result<(), OutputError> {
+    if !shown.film.is_developed() {
+        let clock = Stopwatch::start();
+        shown.film.film();
+        shown.read.report.ms.readback = Some(clock.ms());
+    }
     let clock = Stopwatch::start();
     let files = output::picture_files(&shown.read.picture, &shown.film, shown.read.encoding)?;
     shown.read.report.ms.encode = Some(clock.ms());

@@ -31,14 +31,7 @@ pub(super) fn trace(
             Some(sum)
         })
         .ok_or(DeviceError::Stopped)?;
-    Ok(Traced {
-        film,
-        rays,
-        trace_ms: start.ms(),
-        update_ms: None,
-        readback_ms: None,
-        spans: Spans::default(),
-    })
+    Ok(Traced { film: film.into(), rays, trace_ms: start.ms(), update_ms: None, spans: Spans::default() })
 }
 
 /// Tile after tile; None where it was stopped.

@@ -78,6 +78,19 @@ pub(super) struct Facts {
     pub(super) costs: Vec<f32>,
 }
 
+/// The bytes of a part.
+fn part<'a>(bytes: &'a [u8], range: &Range<u64>) -> &'a [u8] {
+    &bytes[range.start as usize..range.end as usize]
+}
+
+/// What else than the film a frame's bytes say.
+pub(super) fn facts(bytes: &[u8], layout: &Layout) -> Facts {
+    let mut instants = [0; INSTANTS as usize];
+    instants.copy_from_slice(bytemuck::cast_slice(part(bytes, &layout.instants)));
+    let costs = bytemuck::cast_slice(part(bytes, &layout.costs)).to_vec();
+    Facts { rays: ray_counts(bytemuck::cast_slice(part(bytes, &layout.counters))), instants, costs }
+}
+
 /// Takes the film out of a frame's bytes, on the threads of a pool.
 pub(super) fn take_out(
     bytes: &[u8],
@@ -85,10 +98,9 @@ pub(super) fn take_out(
     shot: &Shot,
     output: Output,
     pool: &ThreadPool,
-) -> (Film, Facts) {
-    let of = |range: &Range<u64>| &bytes[range.start as usize..range.end as usize];
-    let words = |range: &Range<u64>| bytemuck::cast_slice::<u8, u32>(of(range));
-    let film = pool.install(|| match output {
+) -> Film {
+    let of = |range: &Range<u64>| part(bytes, range);
+    pool.install(|| match output {
         Output::Codes { .. } => Film::of_codes(shot.size, codes(of(&layout.film), shot.size[0])),
         Output::Linear => {
             let floats: &[f32] = bytemuck::cast_slice(of(&layout.film));
@@ -105,14 +117,10 @@ pub(super) fn take_out(
             if let Some(to) = &mut film.aovs.albedo {
                 to.copy_from_slice(albedo.as_chunks::<3>().0);
             }
-            fill_center(&mut film, words(&layout.center));
+            fill_center(&mut film, bytemuck::cast_slice(of(&layout.center)));
             film
         }
-    });
-    let mut instants = [0; INSTANTS as usize];
-    instants.copy_from_slice(bytemuck::cast_slice(of(&layout.instants)));
-    let costs = bytemuck::cast_slice(of(&layout.costs)).to_vec();
-    (film, Facts { rays: ray_counts(words(&layout.counters)), instants, costs })
+    })
 }
 
 /// Bytes of a row of codes: three a pixel, and what fills its last word.

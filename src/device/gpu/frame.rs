@@ -4,18 +4,19 @@
 use super::adapter::Gpu;
 use super::arena::{Arena, Section};
 use super::cuts::{Cut, GROUP, LANES_MOST, Pace, cuts, tile};
-use super::film::{COUNTERS, Facts, INSTANTS, Layout, take_out};
+use super::exposed::{Exposed, FilmBuffers, Free};
+use super::film::{COUNTERS, Facts, INSTANTS, Layout, facts};
 use super::fits::{Fits, groups, is_top};
 use super::pipelines::{Kernel, Pipelines};
 use super::records::{Slice, WAITING_ROWS};
 use super::resident::{FitOf, Heaps};
 use super::scene::Records;
-use crate::clock::Stopwatch;
 use crate::device::{DeviceError, Output, Stop};
-use crate::film::Film;
+use crate::film::LatentFilm;
 use crate::scene::Shot;
 use rayon::ThreadPool;
 use std::ops::Range;
+use std::sync::Arc;
 
 /// Frames under way at most: one is read back, one traced, one prepared.
 pub(super) const SLOTS: usize = 3;
@@ -32,25 +33,15 @@ pub(super) struct Buffers {
     boxes: Option<wgpu::Buffer>,
     costs: Option<wgpu::Buffer>,
     instants: Option<(wgpu::QuerySet, wgpu::Buffer)>,
-    slots: [Slot; SLOTS],
     pub(super) pace: Pace,
-    /// The slot of the next frame.
-    next: usize,
-}
-
-/// What one frame under way writes.
-#[derive(Debug, Default)]
-struct Slot {
-    /// Where kernels write the film.
-    film: Option<wgpu::Buffer>,
-    /// Where the host reads it; None where that is the same.
-    back: Option<wgpu::Buffer>,
+    /// Where films may be written.
+    pub(super) free: Free,
 }
 
 /// A frame that was handed to the queue.
 #[derive(Debug)]
 pub(super) struct Begun {
-    slot: usize,
+    film: FilmBuffers,
     layout: Layout,
     shot: Shot,
     output: Output,
@@ -122,11 +113,9 @@ impl Ground<'_> {
             cuts(shot.size, tile(1), samples / u64::from(shot.size[0]))
         };
         self.room_for_fits(fits)?;
-        let slot = self.room_for_frame(&layout, waiting_bytes)?;
+        let buffers = self.room_for_frame(&layout, waiting_bytes)?;
         let sections = self.write_frame(records, fits, &slices, &center_slices, lanes, waiting_each)?;
-        let (film, back) =
-            (held(self.buffers.slots[slot].film.as_ref()), self.buffers.slots[slot].back.clone());
-        let film = film.clone();
+        let film = &buffers.film;
 
         let mut encoder = self.encoder();
         let instants = self.buffers.instants.clone();
@@ -140,7 +129,7 @@ impl Ground<'_> {
             if cuts.is_empty() {
                 continue;
             }
-            let group = self.bindings(&sections, slices, &film, range);
+            let group = self.bindings(&sections, slices, film, range);
             let pipeline = self.pipelines.tracing(self.gpu, kernel, records.has).clone();
             for (i, cut) in cuts.iter().enumerate() {
                 if stop.asked() {
@@ -158,53 +147,46 @@ impl Ground<'_> {
             }
         }
         let counters = held(self.buffers.counters.as_ref());
-        encoder.copy_buffer_to_buffer(counters, 0, &film, layout.counters.start, 4 * COUNTERS);
+        encoder.copy_buffer_to_buffer(counters, 0, film, layout.counters.start, 4 * COUNTERS);
         if let Some((set, resolved)) = &instants {
             encoder.resolve_query_set(set, 0..INSTANTS as u32, resolved, 0);
-            encoder.copy_buffer_to_buffer(resolved, 0, &film, layout.instants.start, 8 * INSTANTS);
+            encoder.copy_buffer_to_buffer(resolved, 0, film, layout.instants.start, 8 * INSTANTS);
         }
         if !fits.is_empty() {
             let bytes = 4 * fits.trees.len() as u64;
             encoder.copy_buffer_to_buffer(
                 held(self.buffers.costs.as_ref()),
                 0,
-                &film,
+                film,
                 layout.costs.start,
                 bytes,
             );
         }
-        if let Some(back) = &back {
-            encoder.copy_buffer_to_buffer(&film, 0, back, 0, layout.bytes());
+        if let Some(back) = &buffers.back {
+            encoder.copy_buffer_to_buffer(film, 0, back, 0, layout.bytes());
         }
         let submission = self.gpu.queue.submit([encoder.finish()]);
-        back.as_ref().unwrap_or(&film).slice(..layout.bytes()).map_async(wgpu::MapMode::Read, |_| {});
+        buffers.read_by_host().slice(..layout.bytes()).map_async(wgpu::MapMode::Read, |_| {});
         self.gpu.check()?;
-        self.buffers.next = (slot + 1) % SLOTS;
         let fits = fits.of.clone();
-        Ok(Begun { slot, layout, shot: shot.clone(), output, submission, fits })
+        Ok(Begun { film: buffers, layout, shot: shot.clone(), output, submission, fits })
     }
 
-    /// Waits for a frame and takes its film; gives what that took, ms, the waiting not counted.
+    /// Waits for a frame; its film lies in its buffer until it is asked for, and is then copied on the threads of a pool.
     pub(super) fn finish(
         &mut self,
-        begun: &Begun,
-        pool: &ThreadPool,
-    ) -> Result<(Film, Facts, f64), DeviceError> {
-        self.gpu.wait_for(begun.submission.clone())?;
-        let clock = Stopwatch::start();
-        let slot = &self.buffers.slots[begun.slot];
-        let buffer = slot.back.as_ref().unwrap_or_else(|| held(slot.film.as_ref()));
-        let (film, facts) = {
-            let lost = |e: wgpu::MapRangeError| DeviceError::Lost {
-                device: self.gpu.name.clone(),
-                why: e.to_string(),
-            };
-            let view = buffer.slice(..begun.layout.bytes()).get_mapped_range().map_err(lost)?;
-            take_out(&view, &begun.layout, &begun.shot, begun.output, pool)
-        };
-        buffer.unmap();
+        begun: Begun,
+        pool: &Arc<ThreadPool>,
+    ) -> Result<(LatentFilm, Facts), DeviceError> {
+        let Begun { film, layout, shot, output, submission, .. } = begun;
+        self.gpu.wait_for(submission)?;
+        let lost =
+            |e: wgpu::MapRangeError| DeviceError::Lost { device: self.gpu.name.clone(), why: e.to_string() };
+        let view = film.read_by_host().slice(..layout.bytes()).get_mapped_range().map_err(lost)?;
+        let facts = facts(&view, &layout);
         self.gpu.check()?;
-        Ok((film, facts, clock.ms()))
+        let exposed = Exposed { view, film, layout, shot, output, pool: Arc::clone(pool) };
+        Ok((self.buffers.free.latent(exposed), facts))
     }
 
     #[allow(clippy::too_many_arguments, reason = "what a dispatch is")]
@@ -255,8 +237,8 @@ impl Ground<'_> {
         room(gpu, "costs", &mut buffers.costs, 4 * fits.trees.len().max(1) as u64, usage)
     }
 
-    /// Makes room for a frame; gives its slot.
-    fn room_for_frame(&mut self, layout: &Layout, waiting_bytes: u64) -> Result<usize, DeviceError> {
+    /// Makes room for a frame; gives where its film goes.
+    fn room_for_frame(&mut self, layout: &Layout, waiting_bytes: u64) -> Result<FilmBuffers, DeviceError> {
         let Self { gpu, buffers, .. } = self;
         let storage = wgpu::BufferUsages::STORAGE;
         let (source, target) = (wgpu::BufferUsages::COPY_SRC, wgpu::BufferUsages::COPY_DST);
@@ -273,16 +255,19 @@ impl Ground<'_> {
             room(gpu, "instants", &mut resolved, 256, usage)?;
             buffers.instants = resolved.map(|resolved| (set, resolved));
         }
-        let slot = buffers.next;
-        let Slot { film, back } = &mut buffers.slots[slot];
+        let bytes = layout.bytes().next_multiple_of(16);
+        if let Some(film) = buffers.free.take(bytes) {
+            return Ok(film);
+        }
+        gpu.allows("the picture", bytes)?;
+        let buffer = |usage| gpu.buffer("the picture", bytes, usage);
         if gpu.features.contains(wgpu::Features::MAPPABLE_PRIMARY_BUFFERS) {
             // kernels write straight into what the host reads
-            room(gpu, "the picture", film, layout.bytes(), storage | target | wgpu::BufferUsages::MAP_READ)?;
-        } else {
-            room(gpu, "the picture", film, layout.bytes(), storage | source | target)?;
-            room(gpu, "the picture", back, layout.bytes(), target | wgpu::BufferUsages::MAP_READ)?;
+            let film = buffer(storage | target | wgpu::BufferUsages::MAP_READ)?;
+            return Ok(FilmBuffers { film, back: None });
         }
-        Ok(slot)
+        let film = buffer(storage | source | target)?;
+        Ok(FilmBuffers { film, back: Some(buffer(target | wgpu::BufferUsages::MAP_READ)?) })
     }
 
     fn write_frame(

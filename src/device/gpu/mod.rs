@@ -4,6 +4,7 @@ mod adapter;
 mod arena;
 mod cache;
 mod cuts;
+mod exposed;
 mod film;
 mod fits;
 mod frame;
@@ -42,7 +43,7 @@ pub struct GpuDevice {
     /// Has compiled kernels.
     store: Option<Arc<Store>>,
     /// Builds trees.
-    pool: ThreadPool,
+    pool: Arc<ThreadPool>,
     /// None once it was lost, until it is opened again.
     open: Option<Open>,
     /// What a lost one holds.
@@ -88,6 +89,7 @@ impl GpuDevice {
             .num_threads(threads)
             .thread_name(|i| format!("gpu-build-{i}"))
             .build()
+            .map(Arc::new)
             .map_err(no_threads)?;
         let info = DeviceInfo {
             name: adapter.name(),
@@ -105,6 +107,8 @@ impl GpuDevice {
     /// Loses the device as a driver might, for tests.
     pub fn lose(&self) {
         if let Some(open) = &self.open {
+            // what is read may not vanish
+            open.buffers.free.rescue();
             open.gpu.device.destroy();
         }
     }
@@ -204,8 +208,9 @@ impl GpuDevice {
         };
         let Some(open) = &mut self.open else { return Err(lost()) };
         let Some((begun, start)) = open.under_way.pop_front() else { return Err(lost()) };
-        let (film, facts, readback_ms) = open.ground().finish(&begun, &self.pool)?;
-        for (of, cost) in begun.fits.iter().zip(&facts.costs) {
+        let (fits, samples) = (begun.fits.clone(), begun.samples());
+        let (film, facts) = open.ground().finish(begun, &self.pool)?;
+        for (of, cost) in fits.iter().zip(&facts.costs) {
             open.resident.fitted(*of, *cost);
         }
         let span = |first: usize| {
@@ -213,18 +218,11 @@ impl GpuDevice {
             let ms = |ticks: u64| ticks as f64 * f64::from(open.gpu.queue.get_timestamp_period()) * 1e-6;
             (from > 0 && to >= from).then(|| [ms(from), ms(to)])
         };
-        let spans = Spans { update: if begun.fits.is_empty() { None } else { span(0) }, trace: span(2) };
+        let spans = Spans { update: if fits.is_empty() { None } else { span(0) }, trace: span(2) };
         let length = |[from, to]: [f64; 2]| to - from;
         let trace_ms = spans.trace.map_or_else(|| start.ms(), length);
-        open.buffers.pace.learn(begun.samples(), trace_ms);
-        Ok(Traced {
-            film,
-            rays: facts.rays,
-            trace_ms,
-            update_ms: spans.update.map(length),
-            readback_ms: Some(readback_ms),
-            spans,
-        })
+        open.buffers.pace.learn(samples, trace_ms);
+        Ok(Traced { film, rays: facts.rays, trace_ms, update_ms: spans.update.map(length), spans })
     }
 }
 
