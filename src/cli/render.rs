@@ -17,7 +17,7 @@ use std::sync::Arc;
 pub(super) fn render(args: &RenderArgs, global: &Global) -> Result<ExitCode> {
     let job = job::resolve(&request::request(args)?)?;
     let options = run_options(args);
-    let mut devices = [device(args, &options)?];
+    let mut devices = devices(args, &options)?;
     if args.dry_run {
         dry_run(&job, global);
         return Ok(ExitCode::SUCCESS);
@@ -48,6 +48,7 @@ pub(super) fn run_options(args: &RenderArgs) -> RunOptions {
         memory_bytes: Some(args.memory.unwrap_or_else(machine::default_budget_bytes)),
         cold: args.cold,
         update: args.update.into(),
+        policy: args.schedule.into(),
         overwrite: args.overwrite,
         lenient: args.lenient,
         strict: args.strict,
@@ -62,15 +63,15 @@ fn store_of(args: &RenderArgs) -> Option<Arc<Store>> {
     if args.no_cache { None } else { store(args.cache.as_deref()) }
 }
 
-/// The device asked for.
-pub(super) fn device(args: &RenderArgs, options: &RunOptions) -> Result<Box<dyn Device>> {
+/// The devices asked for.
+pub(super) fn devices(args: &RenderArgs, options: &RunOptions) -> Result<Vec<Box<dyn Device>>> {
     let wanted = registry::Wanted {
         threads: threads(args),
         budget_bytes: args.device_memory,
         host_budget_bytes: machine::default_budget_bytes(),
         store: options.store.clone(),
     };
-    Ok(registry::open(args.device.as_deref(), &wanted)?)
+    Ok(registry::open_all(args.device.as_deref(), &wanted)?)
 }
 
 fn threads(args: &RenderArgs) -> usize {

@@ -3,8 +3,27 @@
 use super::progress::ProgressKind;
 use super::size;
 use crate::plan::Update;
+use crate::schedule::Policy;
 use clap::Args;
 use std::path::PathBuf;
+
+/// `--schedule`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+pub(super) enum ScheduleWord {
+    /// Where they end first, counting what is resident
+    Affinity,
+    /// To whichever device asks
+    Fifo,
+}
+
+impl From<ScheduleWord> for Policy {
+    fn from(word: ScheduleWord) -> Self {
+        match word {
+            ScheduleWord::Affinity => Self::Affinity,
+            ScheduleWord::Fifo => Self::Fifo,
+        }
+    }
+}
 
 /// `--update`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
@@ -138,9 +157,19 @@ pub(super) struct RenderArgs {
     #[arg(long, value_name = "WEIGHT", help_heading = "Quality")]
     pub prune: Option<f32>,
 
-    /// What renders: cpu [default: cpu]
-    #[arg(long, value_name = "NAME", help_heading = "Machine")]
+    /// What renders: cpu, gpu:0 and so on (`rentix devices` lists them), several with commas, cpu/2 (the CPU as two), all
+    /// [default: the best hardware GPU, else cpu]
+    #[arg(long, value_name = "NAME[,NAME]", help_heading = "Machine")]
     pub device: Option<String>,
+    /// How several devices share frames: affinity (where they end first, counting what is resident) or fifo
+    #[arg(
+        long,
+        value_name = "HOW",
+        default_value = "affinity",
+        hide_default_value = true,
+        help_heading = "Machine"
+    )]
+    pub schedule: ScheduleWord,
     /// Threads [default: all cores]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024), help_heading = "Machine")]
     pub threads: Option<u16>,

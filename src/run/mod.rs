@@ -5,12 +5,14 @@ mod animation;
 mod boxes;
 mod check;
 mod costs;
+mod estimate;
 pub mod event;
 pub mod machine;
 mod memory;
 mod prepare;
 mod read;
 mod report;
+mod share;
 mod source;
 mod trace;
 pub mod verify;
@@ -27,14 +29,15 @@ use crate::film::LatentFilm;
 use crate::job::Job;
 use crate::output::{self, OutputError, Records, RunLog};
 use crate::plan::Update;
+use crate::schedule::{DeviceFacts, Policy, ScheduleError};
 use crate::store::Store;
 use crate::warning::Warnings;
-use memory::InFlight;
 use read::ReadFrame;
+use share::Share;
 use std::path::PathBuf;
-use std::sync::atomic::AtomicUsize;
 use std::sync::mpsc::{channel, sync_channel};
 use std::sync::{Arc, Mutex};
+use trace::Ends;
 
 /// Frames read ahead of the device beyond those being read.
 const FRAMES_READ_AHEAD: usize = 1;
@@ -68,6 +71,8 @@ pub struct RunOptions {
     pub lenient: bool,
     /// What is missing fails its frame.
     pub strict: bool,
+    /// How frames are shared out over several devices.
+    pub policy: Policy,
     /// Where the report goes.
     pub report: Option<PathBuf>,
     /// Whether the outcome has the reports of all frames, as it has where a report goes somewhere; else only of those that
@@ -96,6 +101,9 @@ pub enum RunError {
     /// The output folder cannot be used.
     #[error(transparent)]
     Output(#[from] OutputError),
+    /// No device can take the frames.
+    #[error(transparent)]
+    Schedule(#[from] ScheduleError),
     /// There is no place for temporary pictures.
     #[error("no temporary folder can be made: {0}; TMPDIR names another place")]
     NoRoom(std::io::Error),
@@ -124,7 +132,7 @@ impl Outcome {
 enum Note {
     Frame(Box<FrameReport>),
     Warnings(Warnings),
-    Device(DeviceReport),
+    Device(usize, DeviceReport),
 }
 
 /// A traced frame on its way to its file.
@@ -144,19 +152,18 @@ pub fn render(
     on_event: &mut dyn FnMut(&Event),
 ) -> Result<Outcome, RunError> {
     let since = Stopwatch::start();
-    let device = &mut *devices[0];
     let records = Records::read(&job.folder)?;
     check::nothing_is_lost(job, &records, options)?;
     clean_up(job);
     let mut warnings = Warnings::default();
     let mut report = Report::new(
-        vec![DeviceReport::new(device.info())],
+        devices.iter().map(|device| DeviceReport::new(device.info())).collect(),
         options.keeps_reports || options.report.is_some(),
     );
     on_event(&Event::Start {
         frames: job.pictures.len(),
         folder: job.folder.display().to_string(),
-        devices: vec![device.info().name.clone()],
+        devices: devices.iter().map(|device| device.info().name.clone()).collect(),
     });
     tell(&job.warnings, &mut warnings, &mut report, on_event);
     let prepared = prepare::prepare(job, options);
@@ -164,31 +171,31 @@ pub fn render(
 
     let reader = read::Reader::new(job, options, &records, prepared);
     let log = RunLog::create(&job.folder);
-    let next = AtomicUsize::new(0);
-    let threads = stage_threads(options.threads, device.info().kind);
-    let flight =
-        InFlight::new((threads + FRAMES_READ_AHEAD).max(3), options.memory_bytes.unwrap_or(u64::MAX));
+    let threads =
+        devices.iter().map(|device| stage_threads(options.threads, device.info().kind)).max().unwrap_or(1);
+    let share = shared(job, options, devices, threads)?;
     let mut saved = report::Saver::new(options.report.clone());
 
     std::thread::scope(|scope| {
         let (note, notes) = channel::<Note>();
-        let (to_device, from_readers) = channel::<read::Read>();
+        let (to_devices, from_readers): (Vec<_>, Vec<_>) = devices.iter().map(|_| channel()).unzip();
         // no queue between device and writers: a film waits in the device stage until a writer is free
         let (to_writers, from_device) = sync_channel::<Shown>(0);
         let from_device = Arc::new(Mutex::new(from_device));
         for _ in 0..threads {
-            let (to_device, note) = (to_device.clone(), note.clone());
-            let (reader, next, flight) = (&reader, &next, &flight);
-            scope.spawn(move || read::read_stage(reader, next, flight, stop, &to_device, &note));
+            let (to_devices, note) = (to_devices.clone(), note.clone());
+            let (reader, share) = (&reader, &share);
+            scope.spawn(move || read::read_stage(reader, share, stop, &to_devices, &note));
         }
-        drop(to_device);
-        {
-            let (note, flight, device) = (note.clone(), &flight, &mut *device);
+        drop(to_devices);
+        for (place, (device, from_readers)) in devices.iter_mut().zip(from_readers).enumerate() {
+            let (note, to_writers, share) = (note.clone(), to_writers.clone(), &share);
             scope.spawn(move || {
-                let frames = job.pictures.len();
-                trace::device_stage(device, options, frames, &from_readers, flight, stop, &to_writers, &note);
+                let ends = Ends { device: place, share, stop, to_writers: &to_writers, note: &note };
+                trace::device_stage(&mut **device, options, &from_readers, ends);
             });
         }
+        drop(to_writers);
         for _ in 0..threads {
             let (log, from_device, note) = (&log, Arc::clone(&from_device), note.clone());
             scope.spawn(move || write::write_stage(log, &from_device, &note));
@@ -205,7 +212,7 @@ pub fn render(
                     on_event(&Event::Frame(frame));
                 }
                 Note::Warnings(w) => tell(&w, &mut warnings, &mut report, on_event),
-                Note::Device(d) => report.devices[0] = d,
+                Note::Device(i, d) => report.devices[i] = d,
             }
             // what cannot be written now is tried again, and told of at the end
             let _ = saved.save(&mut report, &since, false);
@@ -227,6 +234,25 @@ pub fn render(
     report.settle(&since);
     let stopped = stop.asked();
     saved.save(&mut report, &since, true).map_err(RunError::Report).map(|()| Outcome { report, stopped })
+}
+
+/// The frames of a job, shared out over devices of which each has as many read ahead as there are readers for it.
+fn shared(
+    job: &Job,
+    options: &RunOptions,
+    devices: &[Box<dyn Device>],
+    readers: usize,
+) -> Result<Share, RunError> {
+    let budget_bytes = |device: &dyn Device| device.info().budget_bytes;
+    // what two devices take for a frame is never quite the same
+    let facts = |(kind, device): (usize, &Box<dyn Device>)| {
+        let facts = DeviceFacts { budget_bytes: budget_bytes(&**device), kind };
+        (facts, estimate::estimate(job, device.info()))
+    };
+    let all: Vec<_> = devices.iter().enumerate().map(facts).collect();
+    let ahead = (readers.div_ceil(devices.len().max(1)) + FRAMES_READ_AHEAD).max(3);
+    let memory_bytes = options.memory_bytes.unwrap_or(u64::MAX);
+    Ok(Share::new(options.policy, job.pictures.len(), &all, ahead, memory_bytes)?)
 }
 
 /// What a caught panic says, for the error of its frame.

@@ -2,8 +2,9 @@
 
 use super::animation::{self, Views};
 use super::event::{ByteCounts, FrameReport, StageTimes, Status, UpdateReport};
-use super::memory::{InFlight, expected_bytes, needed_bytes, refusal};
+use super::memory::{expected_bytes, needed_bytes, refusal};
 use super::prepare::Prepared;
+use super::share::{Share, Turn};
 use super::source::{Place, Sources};
 use super::{Note, RunOptions, panic_text};
 use crate::device::Stop;
@@ -17,7 +18,6 @@ use std::collections::HashMap;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::mpsc::Sender;
 
 /// Changes whenever the same inputs may give other pixels, so that pictures of other versions are made anew.
@@ -38,7 +38,7 @@ pub(super) struct ReadFrame {
 
 /// What became of a picture's turn with a reader.
 pub(super) struct Read {
-    pub(super) index: usize,
+    pub(super) turn: Turn,
     /// Of the budget, taken until the frame has left the device stage.
     pub(super) bytes: u64,
     /// The frame; or its report, where it ends here.
@@ -57,32 +57,25 @@ pub(super) struct Reader<'a> {
     first_of: HashMap<usize, usize>,
 }
 
-/// Reads pictures in turn until there are no more, never more ahead of the device than there are slots.
+/// Reads pictures for devices until there are no more.
 pub(super) fn read_stage(
     reader: &Reader<'_>,
-    next: &AtomicUsize,
-    flight: &InFlight,
+    share: &Share,
     stop: &Stop,
-    to_device: &Sender<Read>,
+    to_devices: &[Sender<Read>],
     note: &Sender<Note>,
 ) {
-    loop {
-        flight.take_slot();
-        let index = next.fetch_add(1, Ordering::Relaxed);
-        if index >= reader.job.pictures.len() || stop.asked() {
-            // the other readers must come to this point too
-            flight.give_back_slot();
-            return;
-        }
+    while let Some(turn) = share.next(stop) {
         let mut warnings = Warnings::default();
+        let index = turn.index;
         let bytes = expected_bytes(reader.job, &reader.job.pictures[index]);
-        flight.take_bytes(index, bytes);
+        share.take_bytes(turn, bytes);
         let outcome = catch_unwind(AssertUnwindSafe(|| reader.read(index, bytes, &mut warnings)))
             .unwrap_or_else(|panic| Err(reader.failed(index, &panic_text("reading", &*panic))));
         if !warnings.is_empty() {
             let _ = note.send(Note::Warnings(warnings));
         }
-        if to_device.send(Read { index, bytes, outcome }).is_err() {
+        if to_devices[turn.device].send(Read { turn, bytes, outcome }).is_err() {
             return;
         }
     }

@@ -27,20 +27,25 @@ fn statuses(outcome: &Outcome) -> Vec<(Option<i64>, Status)> {
 }
 
 fn run(request: &Request, faults: &[(usize, Fault)], options: &RunOptions) -> Outcome {
+    run_on(request, &[faults], options)
+}
+
+/// A run on fake devices of which each has faults of its own, by pictures.
+fn run_on(request: &Request, devices: &[&[(usize, Fault)]], options: &RunOptions) -> Outcome {
     let job = resolve(request).unwrap();
-    let mut device = FakeDevice::new("fake", 1 << 20);
-    for &(picture, fault) in faults {
-        let frame = read_frame(
-            &job,
-            &job.pictures[picture],
-            &source::Sources::default(),
-            false,
-            &mut Warnings::default(),
-        )
-        .unwrap();
-        device = device.with_fault(frame.hash(), fault);
-    }
-    render(&job, options, &mut [Box::new(device)], &Stop::default(), &mut |_| {}).unwrap()
+    let frame = |picture: usize| {
+        let (sources, warnings) = (source::Sources::default(), &mut Warnings::default());
+        read_frame(&job, &job.pictures[picture], &sources, false, warnings).unwrap()
+    };
+    let fake = |(i, faults): (usize, &&[(usize, Fault)])| {
+        let device = FakeDevice::new(&format!("fake:{i}"), 1 << 20);
+        let with = |device: FakeDevice, &(picture, fault): &(usize, Fault)| {
+            device.with_fault(frame(picture).hash(), fault)
+        };
+        Box::new(faults.iter().fold(device, with)) as Box<dyn Device>
+    };
+    let mut devices: Vec<_> = devices.iter().enumerate().map(fake).collect();
+    render(&job, options, &mut devices, &Stop::default(), &mut |_| {}).unwrap()
 }
 
 fn two_threads() -> RunOptions {
@@ -149,4 +154,52 @@ fn a_picture_that_is_gone_at_the_end_is_told_of_with_and_without_a_report() {
         assert_eq!((outcome.report.totals.rendered, outcome.report.totals.failed), (5, 1));
         assert_eq!(outcome.report.frames.len(), if keeps_reports { FRAMES } else { 1 });
     }
+}
+
+#[test]
+fn several_devices_make_what_one_makes() {
+    let t = tempfile::tempdir().unwrap();
+    let mut request = sequence(t.path());
+    run(&request, &[], &two_threads());
+    let first = pictures(&t.path().join("out"));
+    for policy in [Policy::Affinity, Policy::Fifo] {
+        let folder = t.path().join(format!("{policy:?}"));
+        request.folder = Some(folder.clone());
+        let outcome = run_on(&request, &[&[], &[], &[]], &RunOptions { policy, ..two_threads() });
+        assert_eq!(pictures(&folder), first);
+        let traced: u64 = outcome.report.devices.iter().map(|d| d.frames).sum();
+        assert_eq!(traced, FRAMES as u64);
+        assert_eq!(outcome.report.devices.len(), 3);
+    }
+}
+
+#[test]
+fn what_fails_on_one_device_is_made_by_another() {
+    let t = tempfile::tempdir().unwrap();
+    // which device has a frame first is chance: each fails at other ones
+    let faults: [&[_]; 2] = [
+        &[(0, Fault::OutOfMemory), (2, Fault::OutOfMemory)],
+        &[(1, Fault::OutOfMemory), (5, Fault::OutOfMemory)],
+    ];
+    let outcome = run_on(&sequence(t.path()), &faults, &two_threads());
+    assert_eq!(outcome.report.totals.rendered, FRAMES as u64, "{:?}", statuses(&outcome));
+}
+
+#[test]
+fn what_fails_on_two_devices_has_failed() {
+    let t = tempfile::tempdir().unwrap();
+    let faults: &[_] = &[(3, Fault::OutOfMemory)];
+    let outcome = run_on(&sequence(t.path()), &[faults, faults, faults], &two_threads());
+    assert_eq!(outcome.report.totals.rendered, 5);
+    let failed: Vec<_> = outcome.failed().collect();
+    assert!(failed.len() == 1 && failed[0].frame == Some(4) && failed[0].device_failed);
+}
+
+#[test]
+fn a_device_that_stays_lost_gives_its_frames_to_another() {
+    let t = tempfile::tempdir().unwrap();
+    let lost: Vec<_> = (0..FRAMES).map(|picture| (picture, Fault::Lost)).collect();
+    let outcome = run_on(&sequence(t.path()), &[&lost, &[]], &two_threads());
+    assert_eq!(outcome.report.totals.rendered, FRAMES as u64, "{:?}", statuses(&outcome));
+    assert!(outcome.report.frames.iter().all(|f| f.device.as_deref() == Some("fake:1")));
 }

@@ -2,9 +2,9 @@
 
 use super::costs::Learned;
 use super::event::{Status, UpdateReport};
-use super::memory::InFlight;
 use super::read::{Read, ReadFrame};
 use super::report::DeviceReport;
+use super::share::Share;
 use super::{Note, RunOptions, Shown, panic_text};
 use crate::clock::Stopwatch;
 use crate::device::{Device, DeviceError, Output, Stop, Traced, UpdateCost};
@@ -22,16 +22,11 @@ use std::sync::mpsc::{Receiver, Sender, SyncSender, TryRecvError};
 
 /// Takes frames in their order, makes each resident, traces it and hands the film to a writer. As many frames are under way
 /// as the device takes; where no other is read yet, the first of them is waited for.
-#[allow(clippy::too_many_arguments, reason = "the stage's ends")]
 pub(super) fn device_stage(
     device: &mut dyn Device,
     options: &RunOptions,
-    frames: usize,
     from_readers: &Receiver<Read>,
-    flight: &InFlight,
-    stop: &Stop,
-    to_writers: &SyncSender<Shown>,
-    note: &Sender<Note>,
+    ends: Ends<'_>,
 ) {
     let mut stage = DeviceStage {
         told: DeviceReport::new(device.info()),
@@ -42,13 +37,16 @@ pub(super) fn device_stage(
         cold: options.cold,
         update: options.update,
         learned: Learned::new(),
-        frames_left: frames as u64,
         forget: false,
+        losses: 0,
+        is_gone: false,
+        clock: Stopwatch::start(),
+        ended_s: 0.0,
         warnings: Warnings::default(),
-        ends: Ends { flight, stop, to_writers, note },
+        ends,
     };
     let mut waiting = BTreeMap::new();
-    let mut turn = 0;
+    let mut next = 0;
     loop {
         let read = if stage.under_way.is_empty() {
             from_readers.recv().map_err(|_| TryRecvError::Disconnected)
@@ -57,7 +55,7 @@ pub(super) fn device_stage(
         };
         match read {
             Ok(read) => {
-                waiting.insert(read.index, read);
+                waiting.insert(read.turn.turn, read);
             }
             Err(TryRecvError::Empty) => {
                 stage.finish_first();
@@ -65,14 +63,18 @@ pub(super) fn device_stage(
             }
             Err(TryRecvError::Disconnected) => break,
         }
-        while let Some(Read { bytes, outcome, .. }) = waiting.remove(&turn) {
-            turn += 1;
-            stage.frames_left = (frames - turn.min(frames)) as u64;
-            flight.give_slot();
+        while let Some(Read { turn, bytes, outcome }) = waiting.remove(&next) {
+            next += 1;
+            let Ends { share, stop, note, device, .. } = stage.ends;
+            share.taken(device);
             match outcome {
-                _ if stop.asked() => flight.give_bytes(bytes),
+                _ if stop.asked() || stage.is_gone => {
+                    share.give_bytes(bytes);
+                    share.gave_back(device, turn.index);
+                }
                 Err(report) => {
-                    flight.give_bytes(bytes);
+                    share.give_bytes(bytes);
+                    share.done(device, turn.index, 0.0);
                     let _ = note.send(Note::Frame(report));
                 }
                 Ok(read) => stage.take(read, bytes),
@@ -84,13 +86,19 @@ pub(super) fn device_stage(
     }
 }
 
-/// Where a frame goes from here.
-struct Ends<'a> {
-    flight: &'a InFlight,
-    stop: &'a Stop,
-    to_writers: &'a SyncSender<Shown>,
-    note: &'a Sender<Note>,
+/// Where a frame of a device comes from and goes to.
+#[derive(Clone, Copy)]
+pub(super) struct Ends<'a> {
+    /// The device, by its place among those of the run.
+    pub(super) device: usize,
+    pub(super) share: &'a Share,
+    pub(super) stop: &'a Stop,
+    pub(super) to_writers: &'a SyncSender<Shown>,
+    pub(super) note: &'a Sender<Note>,
 }
+
+/// After so many losses one after the other a device is given up where there is another.
+const LOSSES: usize = 3;
 
 struct DeviceStage<'a> {
     device: &'a mut dyn Device,
@@ -103,10 +111,15 @@ struct DeviceStage<'a> {
     cold: bool,
     update: Update,
     learned: Learned,
-    /// Frames that are still to come.
-    frames_left: u64,
     /// Whether what the device holds is not to be trusted, because it panicked.
     forget: bool,
+    /// Frames in a row with which it was lost.
+    losses: usize,
+    /// Whether it was given up: what is read for it goes back.
+    is_gone: bool,
+    clock: Stopwatch,
+    /// When it last finished a frame.
+    ended_s: f64,
     /// What is to be told of the frame.
     warnings: Warnings,
     ends: Ends<'a>,
@@ -118,6 +131,8 @@ struct UnderWay {
     /// Bytes of the host's memory, until it has left this stage.
     bytes: u64,
     cost: UpdateCost,
+    /// When it was begun, s.
+    begun_s: f64,
 }
 
 /// A frame, and what came of it: None while it is under way.
@@ -149,6 +164,7 @@ impl DeviceStage<'_> {
             }
             // unless it failed
             if let Some(Before { frame, film: Some(film), .. }) = &self.before {
+                self.ends.share.done(self.ends.device, read.report.index, 0.0);
                 let report = &mut read.report;
                 report.warm = true;
                 report.change = changes(Some(frame), &read.frame);
@@ -168,6 +184,7 @@ impl DeviceStage<'_> {
     /// Makes a frame resident and begins to trace it.
     fn begin(&mut self, mut read: ReadFrame, bytes: u64, may_retry: bool) {
         let busy = Stopwatch::start();
+        let begun_s = self.clock.s();
         read.report.device = Some(self.told.name.clone());
         let begun = caught("tracing", || self.update_and_begin(&mut read));
         self.told.busy_s += busy.s();
@@ -177,10 +194,10 @@ impl DeviceStage<'_> {
                 let (frame, fingerprint) = (Arc::clone(&read.frame), read.fingerprint);
                 self.before = Some(Before { frame, fingerprint, film: None });
                 self.forget = false;
-                self.under_way.push_back(UnderWay { read, bytes, cost });
+                self.under_way.push_back(UnderWay { read, bytes, cost, begun_s });
             }
             Err(failure) => {
-                let frame = UnderWay { read, bytes, cost: UpdateCost::default() };
+                let frame = UnderWay { read, bytes, cost: UpdateCost::default(), begun_s };
                 if may_retry && failure.is_lost() {
                     let mut lost = std::mem::take(&mut self.under_way);
                     lost.push_back(frame);
@@ -205,7 +222,9 @@ impl DeviceStage<'_> {
         match traced {
             Ok(traced) => {
                 self.told.frames += 1;
+                self.losses = 0;
                 self.learn(&mut first, &traced);
+                self.tell_share(&first);
                 let film = Arc::new(traced.film);
                 if let Some(before) = &mut self.before
                     && before.fingerprint == first.read.fingerprint
@@ -239,10 +258,25 @@ impl DeviceStage<'_> {
         self.before = None;
         self.forget = true;
         let UnderWay { mut read, bytes, .. } = frame;
-        self.ends.flight.give_bytes(bytes);
+        let Ends { device, share, .. } = self.ends;
+        share.give_bytes(bytes);
+        let index = read.report.index;
+        if matches!(failure, Failure::Device(DeviceError::Stopped)) {
+            share.gave_back(device, index);
+            return self.tell();
+        }
+        self.losses = if failure.is_lost() { self.losses + 1 } else { 0 };
+        let is_tried_again = share.failed(device, index);
+        if self.losses >= LOSSES && share.gone(device) {
+            self.is_gone = true;
+            let text = format!("{} was lost {LOSSES} times and is given up", self.told.name);
+            self.warnings.add(None, None, text);
+        }
+        if is_tried_again {
+            return self.tell();
+        }
         let source = &read.report.source;
         let error = match failure {
-            Failure::Device(DeviceError::Stopped) => return self.tell(),
             Failure::Device(error) => {
                 read.report.device_failed = true;
                 format!("{source}: {error}")
@@ -256,7 +290,7 @@ impl DeviceStage<'_> {
     }
 
     fn shown(&mut self, film: Arc<LatentFilm>, status: Status, read: ReadFrame, bytes: u64) {
-        self.ends.flight.give_bytes(bytes);
+        self.ends.share.give_bytes(bytes);
         self.tell();
         // the writers outlive this stage
         let _ = self.ends.to_writers.send(Shown { film, read, status });
@@ -267,7 +301,7 @@ impl DeviceStage<'_> {
         if !self.warnings.is_empty() {
             let _ = self.ends.note.send(Note::Warnings(std::mem::take(&mut self.warnings)));
         }
-        let _ = self.ends.note.send(Note::Device(self.told.clone()));
+        let _ = self.ends.note.send(Note::Device(self.ends.device, self.told.clone()));
     }
 
     fn update_and_begin(&mut self, read: &mut ReadFrame) -> Result<UpdateCost, DeviceError> {
@@ -282,7 +316,7 @@ impl DeviceStage<'_> {
             budget_bytes: self.device.info().budget_bytes,
             used_again: if self.cold { Vec::new() } else { std::mem::take(&mut read.used_again) },
             update: self.update,
-            costs: self.learned.costs(self.frames_left),
+            costs: self.learned.costs(self.ends.share.left()),
         };
         let plan = plan_frame(&read.frame, self.device.residency(), &wishes);
         let cost = self.device.apply(&plan, &read.frame)?;
@@ -292,6 +326,21 @@ impl DeviceStage<'_> {
             if read.encoding.takes_codes() { Output::Codes { exposure_stops } } else { Output::Linear };
         self.device.begin(&read.frame, &read.shot, output, self.ends.stop)?;
         Ok(cost)
+    }
+
+    /// Tells what a frame took: from its begin, or from the end of the one before, to its own.
+    fn tell_share(&mut self, frame: &UnderWay) {
+        let ended_s = self.clock.s();
+        let seconds = ended_s - frame.begun_s.max(self.ended_s);
+        self.ended_s = ended_s;
+        let Ends { device, share, .. } = self.ends;
+        let index = frame.read.report.index;
+        if frame.read.report.warm {
+            share.done(device, index, seconds);
+        } else {
+            share.started(device, seconds);
+            share.done(device, index, 0.0);
+        }
     }
 
     /// Learns from a frame that was traced, and reports it.

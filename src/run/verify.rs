@@ -41,15 +41,15 @@ pub enum Verdict {
     Stopped,
 }
 
-/// Renders in all ways, to folders of a temporary one, with a device of its own each, and compares pictures and ids.
+/// Renders in all ways, to folders of a temporary one, with devices of its own each, and compares pictures and ids.
 /// Frames that fail must fail in every way. Gives the outcome of the first way, too.
 ///
 /// # Errors
-/// Where there is no room, a run cannot begin, or `device` makes none.
+/// Where there is no room, a run cannot begin, or `devices` makes none.
 pub fn verify<E: From<RunError>>(
     job: &Job,
     options: &RunOptions,
-    mut device: impl FnMut() -> Result<Box<dyn Device>, E>,
+    mut devices: impl FnMut() -> Result<Vec<Box<dyn Device>>, E>,
     stop: &Stop,
     on_event: &mut dyn FnMut(&Way, &Event),
 ) -> Result<(Verdict, Outcome), E> {
@@ -57,7 +57,7 @@ pub fn verify<E: From<RunError>>(
     let mut run = |way: Way| -> Result<Outcome, E> {
         let job = job_of(job, way, &room.path().join(way.name));
         let options = RunOptions { cold: way.cold, report: None, overwrite: false, ..options.clone() };
-        Ok(render(&job, &options, &mut [device()?], stop, &mut |event| on_event(&way, event))?)
+        Ok(render(&job, &options, &mut devices()?, stop, &mut |event| on_event(&way, event))?)
     };
     let first = run(WAYS[0])?;
     if first.stopped {

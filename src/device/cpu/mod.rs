@@ -43,6 +43,13 @@ impl CpuDevice {
         Ok(Self { info, pool, resident: Resident::default(), width, traced: None })
     }
 
+    /// With another name than `cpu`, where it is one of several.
+    #[must_use]
+    pub fn named(mut self, name: String) -> Self {
+        self.info.name = name;
+        self
+    }
+
     /// Takes the shapes of a run's first trees from a store, and puts them into it.
     #[must_use]
     pub fn with_store(mut self, store: Option<Arc<Store>>) -> Self {
