@@ -15,6 +15,7 @@ use std::time::Duration;
 
 /// What `watch` takes beside the options of `render`, which are defaults for jobs that do not say.
 #[derive(Args, Debug)]
+#[allow(clippy::doc_markdown, reason = "this is what --help shows, as it stands")]
 pub(super) struct WatchArgs {
     #[command(flatten)]
     pub render: RenderArgs,
@@ -56,6 +57,8 @@ const SETTLE_MAX_S: f64 = 86_400.0;
 
 /// Watches a folder and renders what is put into it.
 pub(super) fn watch(args: &WatchArgs, global: &Global) -> Result<ExitCode> {
+    // first of all: whoever starts a daemon may stop it at once
+    let stop = stop::on_signals()?;
     let render = &args.render;
     let [inbox] = render.inputs.as_slice() else {
         bail!("one INBOX is watched; start another daemon for another one");
@@ -94,7 +97,6 @@ pub(super) fn watch(args: &WatchArgs, global: &Global) -> Result<ExitCode> {
             smtp,
         },
     };
-    let stop = stop::on_signals()?;
     let ended = watch::watch(&options, devices, &stop.asked, &mut |event| {
         if global.json {
             println!("{}", as_json(event));
@@ -138,7 +140,7 @@ fn tell(event: &WatchEvent<'_>, global: &Global) {
             None => {}
         },
         WatchEvent::Run(job, Event::Warning(warning)) if !global.quiet => {
-            eprintln!("{job}: warning: {warning}")
+            eprintln!("{job}: warning: {warning}");
         }
         WatchEvent::Note(text) => eprintln!("{text}"),
         _ => {}

@@ -80,7 +80,6 @@ fn map_elsewhere(options: &Options) -> Option<&str> {
 #[cfg(test)]
 mod tests {
     use super::super::{Request, resolve};
-    use super::*;
 
     const TRIANGLE: &str = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
 

@@ -78,7 +78,8 @@ pub(super) fn list(inbox: &Path) -> Result<Inbox, WatchError> {
         let entry = entry.map_err(cannot("read", inbox))?;
         let file = entry.file_name();
         let text = file.to_string_lossy().into_owned();
-        if text.starts_with('.') || text.ends_with(".done") || text.ends_with(".cancel") {
+        let says = Path::new(&text).extension().is_some_and(|e| e == "done" || e == "cancel");
+        if text.starts_with('.') || says {
             continue;
         }
         let kind = entry.file_type().map_err(cannot("read", &entry.path()))?;

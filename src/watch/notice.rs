@@ -5,6 +5,7 @@ use super::state::Status;
 use super::{Message, WatchError};
 use lettre::message::Mailbox;
 use lettre::{SmtpTransport, Transport};
+use std::fmt::Write as _;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
@@ -32,7 +33,7 @@ const WEBHOOK_WITHIN: Duration = Duration::from_secs(20);
 /// Pauses before each attempt.
 const PAUSES_S: [u64; 3] = [0, 2, 10];
 /// A mail server has so long.
-const MAIL_WITHIN: Duration = Duration::from_secs(60);
+const MAIL_WITHIN: Duration = Duration::from_mins(1);
 
 /// The thread that tells.
 pub(super) struct Notifier {
@@ -175,7 +176,7 @@ impl Mail {
             folder.display()
         );
         if let Some(error) = &status.error {
-            text += &format!("\n{error}\n");
+            let _ = write!(text, "\n{error}\n");
         }
         let message = lettre::Message::builder()
             .from(self.from.clone())

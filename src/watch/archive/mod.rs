@@ -191,13 +191,11 @@ struct Counted<'a, R> {
 impl<R: Read> Read for Counted<'_, R> {
     fn read(&mut self, room: &mut [u8]) -> io::Result<usize> {
         let n = self.inner.read(room)?;
-        match self.budget.left.get().checked_sub(n as u64) {
-            Some(left) => self.budget.left.set(left),
-            None => {
-                self.budget.spent.set(true);
-                return Err(io::Error::other("becomes too much"));
-            }
-        }
+        let Some(left) = self.budget.left.get().checked_sub(n as u64) else {
+            self.budget.spent.set(true);
+            return Err(io::Error::other("becomes too much"));
+        };
+        self.budget.left.set(left);
         Ok(n)
     }
 }

@@ -48,7 +48,7 @@ pub(super) fn visit<R: Read>(stream: R, visit: &mut Visit<'_>) -> Result<(), Arc
         }
         long_name = None;
     }
-    drop(archive);
+    let _ = archive;
     // the checksum of what is packed stands at its end
     io::copy(&mut stream, &mut io::sink()).map_err(|e| visit.broken(e))?;
     if stream.zeros == 0 {

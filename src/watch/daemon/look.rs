@@ -115,12 +115,11 @@ impl Daemon<'_> {
                 return self.note(&text);
             }
         };
-        let is_other = match &mut entry.settling {
-            Some(settling) => settling.see(seen, now),
-            None => {
-                entry.settling = Some(Settling::new(seen, now));
-                true
-            }
+        let is_other = if let Some(settling) = &mut entry.settling {
+            settling.see(seen, now)
+        } else {
+            entry.settling = Some(Settling::new(seen, now));
+            true
         };
         if seen.files == 0 && !entry.named {
             return;

@@ -34,7 +34,7 @@ const SCAN_EVERY: [Duration; 2] = [Duration::from_millis(50), Duration::from_sec
 /// What cannot be done now is tried again after so long.
 const AGAIN: Duration = Duration::from_secs(2);
 /// The same is not said again for so long.
-const QUIET: Duration = Duration::from_secs(60);
+const QUIET: Duration = Duration::from_mins(1);
 /// So many things that were said are remembered.
 const SAID_MAX: usize = 256;
 
@@ -94,7 +94,10 @@ impl<'a> Daemon<'a> {
         if let Some(view) = &view {
             let mut ended: Vec<_> = known.iter().filter(|s| s.state.is_end()).cloned().collect();
             ended.sort_by_key(|s| s.times.ended_ms);
-            ended.into_iter().for_each(|status| view.lock().add_ended(status));
+            let mut view = view.lock();
+            for status in ended {
+                view.add_ended(status);
+            }
         }
         let at = options.listen.zip(view.as_ref()).map(|(at, view)| page::serve(at, view)).transpose()?;
         let (hints, no_hints) = Hints::listen(&options.inbox, send.clone());

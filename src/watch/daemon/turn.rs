@@ -6,7 +6,7 @@ use crate::device::Stop;
 use crate::run::{Event, FrameReport, Outcome};
 use crate::watch::inbox::Kind;
 use crate::watch::renderer::{Order, Told};
-use crate::watch::state::{State, Status};
+use crate::watch::state::{FrameCounts, State, Status};
 use crate::watch::{WatchEvent, cannot, job};
 use std::cmp::Reverse;
 use std::fs;
@@ -84,7 +84,7 @@ impl Daemon<'_> {
                 session.hand_over()
             })
         } else {
-            entry.status.frames = Default::default();
+            entry.status.frames = FrameCounts::default();
             None
         };
         entry.first_error = None;
