@@ -6,6 +6,7 @@
 //! | room | what it is for |
 //! | --- | --- |
 //! | [`cli`] | what was typed, what it means, a call below; the only room that prints |
+//! | [`watch`] | the daemon: inbox, settling, archives, jobs' states, journal, status page, notification |
 //! | [`mod@bench`] | workloads, timing, peers, charts |
 //! | [`run`] | a run: reader, device and writer stages, resume, events, report; warm against cold |
 //! | [`schedule`] | frames to devices: estimates, policies, a simulation of them (pure) |
@@ -44,3 +45,4 @@ pub mod scene;
 pub mod schedule;
 pub mod store;
 pub mod warning;
+pub mod watch;

@@ -61,7 +61,7 @@ const ONE_PLACE: &[OnePlace] = &[
     },
     OnePlace {
         // The machine tells about itself in files; a frame is known by its files before it is read.
-        rule: "only format, job, output and store read files (run/machine and run/source: facts, no scenes; bench: texts to move)",
+        rule: "only format, job, output and store read files (run/machine and run/source: facts, no scenes; bench: texts to move; watch: what is put into the inbox and its own)",
         names: &[
             "std::fs::read*",
             "std::fs::File::open",
@@ -70,12 +70,26 @@ const ONE_PLACE: &[OnePlace] = &[
             "std::fs::canonicalize",
             "memmap2",
         ],
-        places: Places::Only(&["format", "job", "output", "store", "run/machine", "run/source", "bench"]),
+        places: Places::Only(&[
+            "format",
+            "job",
+            "output",
+            "store",
+            "run/machine",
+            "run/source",
+            "bench",
+            "watch",
+        ]),
     },
     OnePlace {
         rule: "only device/gpu names wgpu",
         names: &["wgpu", "pollster"],
         places: Places::Only(&["device/gpu"]),
+    },
+    OnePlace {
+        rule: "only watch serves, mails, unpacks and hears of files",
+        names: &["axum", "tokio", "lettre", "ureq", "notify", "zip", "tar", "flate2", "ruzstd"],
+        places: Places::Only(&["watch"]),
     },
     OnePlace { rule: "only accel names obvhs", names: &["obvhs"], places: Places::Only(&["accel"]) },
     OnePlace { rule: "only job reads YAML", names: &["serde_yaml"], places: Places::Only(&["job"]) },

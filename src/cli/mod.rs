@@ -14,6 +14,7 @@ mod size;
 mod stop;
 mod store;
 mod verify;
+mod watch;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use std::process::ExitCode;
@@ -76,6 +77,15 @@ enum Command {
         after_help = "Examples:\n  rentix render walk/\n  rentix render 'walk/walk_####.obj' --frames 1-100x2 --size 1920x1080 --samples 16 -o out\n  rentix render job.yaml"
     )]
     Render(Box<render_args::RenderArgs>),
+    /// Renders what is put into a folder, until it is stopped
+    #[command(
+        override_usage = "rentix watch [OPTIONS] <INBOX>",
+        mut_arg("inputs", |a| a.value_name("INBOX").num_args(1).required(true).help("The folder: a folder or a .zip, .tar, .tar.gz or .tar.zst in it is a job")),
+        mut_arg("output", |a| a.help("Where pictures go, each job's to DIR/NAME [default: out]")),
+        mut_args(|a| if watch::NOT_TAKEN.contains(&a.get_id().as_str()) { a.hide(true) } else { a }),
+        after_help = "Examples:\n  rentix watch inbox/ -o done/ --size fullhd\n  rentix watch inbox/ -o done/ --follow --listen 127.0.0.1:8080 --on-done 'echo $RENTIX_JOB $RENTIX_STATE'\n\nA job.yaml inside a job says how it is rendered and wins over the options. `.done` inside a job, or NAME.done beside it, starts it at once; `.cancel` cancels it. One DIR belongs to one INBOX."
+    )]
+    Watch(Box<watch::WatchArgs>),
     /// Renders warm and cold and in several orders, and compares byte for byte
     #[command(
         after_help = "Example: rentix verify walk/ --size 160x90 --update refit\n\nExit status: 0 equal, 1 they differ; the first frame and pixel that differ are named."
@@ -122,6 +132,7 @@ pub fn main() -> ExitCode {
     };
     let ended = match &cli.command {
         Command::Render(args) => render::render(args, &cli.global),
+        Command::Watch(args) => watch::watch(args, &cli.global),
         Command::Verify(args) => verify::verify(args, &cli.global),
         Command::Inspect(args) => inspect::inspect(args, &cli.global),
         Command::Compare(args) => compare::compare(args, &cli.global),

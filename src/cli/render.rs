@@ -145,7 +145,7 @@ fn frame_list(failed: &[&FrameReport]) -> String {
     text
 }
 
-fn event_json(event: &Event) -> serde_json::Value {
+pub(super) fn event_json(event: &Event) -> serde_json::Value {
     match event {
         Event::Start { frames, folder, devices } => {
             serde_json::json!({"event": "start", "frames": frames, "folder": folder, "devices": devices})
@@ -162,7 +162,7 @@ fn event_json(event: &Event) -> serde_json::Value {
     }
 }
 
-fn end_json(outcome: &Outcome) -> serde_json::Value {
+pub(super) fn end_json(outcome: &Outcome) -> serde_json::Value {
     let r = &outcome.report;
     serde_json::json!({"event": "end", "wall_s": r.wall_s, "totals": r.totals, "devices": r.devices, "stopped": outcome.stopped})
 }

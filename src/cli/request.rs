@@ -23,6 +23,7 @@ pub(super) fn request(args: &RenderArgs) -> Result<Request> {
         fps: ranged("--fps", args.fps, &limits::FPS)?,
         clip: args.clip.as_deref().map(ClipChoice::from_word),
         folder: args.output.clone(),
+        ..Request::default()
     })
 }
 

@@ -72,7 +72,7 @@ impl<'a> Loader<'a> {
             options,
             obj,
             entries: HashMap::new(),
-            lookup: Lookup::default(),
+            lookup: Lookup::within(options.within.clone()),
             incomplete: false,
             inputs: Vec::new(),
             seen: HashSet::new(),

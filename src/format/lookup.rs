@@ -13,9 +13,23 @@ const MAX_NAME_BYTES: usize = 4096;
 pub(super) struct Lookup {
     /// Per folder its entries with their names in lower case, in order.
     listings: HashMap<PathBuf, Vec<(String, OsString)>>,
+    /// The folder that holds all that may be found.
+    within: Option<PathBuf>,
 }
 
 impl Lookup {
+    /// Finds what lies within a folder (as the system names it, without links), or anything.
+    pub(super) fn within(folder: Option<PathBuf>) -> Self {
+        Self { within: folder, ..Self::default() }
+    }
+
+    /// Whether a file that was found may be read.
+    fn is_within(&self, path: &Path) -> bool {
+        self.within
+            .as_ref()
+            .is_none_or(|folder| path.canonicalize().is_ok_and(|real| real.starts_with(folder)))
+    }
+
     /// Looks for a plain file: as written in each of the folders, then with either slash and in any case, last by
     /// the name behind the last slash.
     pub(super) fn find(&mut self, name: &[u8], folders: &[&Path]) -> Option<PathBuf> {
@@ -23,7 +37,10 @@ impl Lookup {
             return None;
         }
         let as_written = path_from_bytes(name);
-        let found = folders.iter().map(|folder| folder.join(&as_written)).find(|path| path.is_file());
+        let found = folders
+            .iter()
+            .map(|folder| folder.join(&as_written))
+            .find(|path| path.is_file() && self.is_within(path));
         if found.is_some() {
             return found;
         }
@@ -48,7 +65,7 @@ impl Lookup {
                 _ => path.join(self.in_any_case(&path, part)?),
             };
         }
-        path.is_file().then_some(path)
+        (path.is_file() && self.is_within(&path)).then_some(path)
     }
 
     fn in_any_case(&mut self, folder: &Path, name: &[u8]) -> Option<&OsString> {
@@ -115,6 +132,12 @@ mod tests {
             assert_eq!(find(name), None, "{name}");
         }
         assert_eq!(find(&format!("{}both.png", "./".repeat(3000))), None, "longer than any name");
+        let mut inside = Lookup::within(Some(obj.canonicalize().unwrap()));
+        let mut find_inside = |name: &str| inside.find(name.as_bytes(), &[&obj]).is_some();
+        assert!(find_inside("near.png") && find_inside("../mtl/both.png"), "by its base name");
+        assert!(
+            !find_inside("../mtl/Maps/Wood.PNG") && !find_inside(mtl.join("Maps/Wood.PNG").to_str().unwrap())
+        );
         let absolute = mtl.join("both.png");
         assert_eq!(find(absolute.to_str().unwrap()).as_deref(), Some("mtl/both.png"));
     }

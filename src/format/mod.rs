@@ -46,6 +46,9 @@ pub struct ReadOptions {
     pub materials_file: Option<PathBuf>,
     /// Statements of the job that replace those of the materials named; applied last.
     pub material_overrides: Vec<MaterialOverride>,
+    /// The folder out of which no name leads, links followed: what is behind such a name counts as missing. None: names
+    /// lead anywhere.
+    pub within: Option<PathBuf>,
 }
 
 /// Statements for one material.

@@ -33,8 +33,13 @@ pub fn placed(layer: &Layer, bounds: &Bounds) -> Bounds {
 
 /// The camera that sees a box, enlarged by 5 % of its diagonal on every side, whole.
 pub fn camera(bounds: &Bounds, settings: &Settings) -> Camera {
+    camera_around(bounds, settings, ENLARGED)
+}
+
+/// The camera that sees a box, enlarged by a share of its diagonal on every side, whole.
+pub fn camera_around(bounds: &Bounds, settings: &Settings, enlarged: f64) -> Camera {
     let bounds = if bounds.is_empty() { Bounds { min: DVec3::ZERO, max: DVec3::ZERO } } else { *bounds };
-    let wider = DVec3::splat(ENLARGED * (bounds.max - bounds.min).length());
+    let wider = DVec3::splat(enlarged * (bounds.max - bounds.min).length());
     let (min, max) = (bounds.min - wider, bounds.max + wider);
     let look_at = (min + max) * 0.5;
     let half_diagonal = 0.5 * (max - min).length();

@@ -3,6 +3,7 @@
 mod animation;
 pub mod auto;
 mod discover;
+mod dropped;
 mod file;
 mod names;
 pub mod numbers;
@@ -16,6 +17,7 @@ pub mod words;
 
 pub use animation::Moment;
 pub use discover::FrameFile;
+pub use dropped::priority;
 pub use file::Outside;
 pub use numbers::{Chunk, FrameSet, Order};
 pub use options::{Background, CameraChoice, LightChoice, Options};
@@ -58,6 +60,12 @@ pub struct Request {
     pub clip: Option<ClipChoice>,
     /// `-o`.
     pub folder: Option<PathBuf>,
+    /// The job was put into this folder (as the system names it, without links) by someone who is not trusted: its job
+    /// file says nothing of where pictures go, nothing of it leads out of the folder, and what it says wins over the
+    /// options.
+    pub dropped: Option<PathBuf>,
+    /// The sequence is still growing: frames that were asked for may be missing yet.
+    pub grows: bool,
 }
 
 /// What is to be rendered.
@@ -73,6 +81,8 @@ pub struct Job {
     pub pictures: Vec<Picture>,
     /// Files that are read, as far as they are known before a frame is: job files, OBJs, layers' MTLs.
     pub inputs: Vec<PathBuf>,
+    /// Jobs of higher priority come first with the daemon; None: nothing is said.
+    pub priority: Option<i64>,
     /// What is wrong but stops nothing.
     pub warnings: Warnings,
 }
@@ -201,6 +211,14 @@ pub enum JobError {
         /// `:LINE:COLUMN` where it is known.
         place: String,
         /// What is wrong.
+        text: String,
+    },
+    /// A dropped job asks for what only its owner may say.
+    #[error("{}: {text}; what is put into a watched folder stays within its own folder", path.display())]
+    Dropped {
+        /// The job file, or the file that lies elsewhere.
+        path: PathBuf,
+        /// What it asks for.
         text: String,
     },
     /// A combination of options is wrong.

@@ -2,12 +2,14 @@
 
 use super::animation;
 use super::discover::{self, Files, Taking};
+use super::dropped;
 use super::file::{self, JobFile, LayerFile, Outside, Override};
 use super::template::{Fill, fill};
 use super::{
-    FrameFile, FrameSet, Job, JobError, Layer, MAX_FRAMES, Picture, Request, Sequence, Settings, Source,
-    main_file,
+    FrameFile, FrameSet, Job, JobError, Layer, MAX_FRAMES, Options, Picture, Request, Sequence, Settings,
+    Source, main_file,
 };
+use crate::format::ClipChoice;
 use crate::warning::Warnings;
 use std::collections::{HashMap, HashSet};
 use std::path::{Path, PathBuf};
@@ -30,7 +32,11 @@ pub fn resolve(request: &Request) -> Result<Job, JobError> {
         [] => JobFile::default(),
         [path] => {
             job.inputs.push((*path).clone());
-            file::read(path)?
+            let read = file::read(path)?;
+            if let Some(folder) = &request.dropped {
+                dropped::check_file(&read, path, folder)?;
+            }
+            read
         }
         _ => {
             return Err(JobError::Options(
@@ -71,6 +77,9 @@ pub fn resolve(request: &Request) -> Result<Job, JobError> {
             .flat_map(|l| l.files.iter().map(|f| f.path.clone()).chain(l.materials.clone()))
             .collect::<Vec<_>>(),
     );
+    if let Some(folder) = &request.dropped {
+        dropped::check_inputs(&job.inputs, folder)?;
+    }
     let folder = request.folder.clone().or(job_file.folder).unwrap_or_else(|| Path::new("out").join(&name));
     Ok(Job {
         name,
@@ -78,6 +87,7 @@ pub fn resolve(request: &Request) -> Result<Job, JobError> {
         sequences: job.sequences,
         pictures: job.pictures,
         inputs: job.inputs,
+        priority: job_file.priority,
         warnings: job.warnings,
     })
 }
@@ -98,13 +108,18 @@ struct Resolving<'a> {
 }
 
 impl Resolving<'_> {
-    /// How INPUTs are taken: what is typed wins over the job.
+    /// How INPUTs are taken: what is typed wins over the job, but over a dropped one.
     fn taking<'t>(request: &'t Request, job: &'t JobFile) -> Taking<'t> {
+        let job_wins = request.dropped.is_some();
         Taking {
             one_sequence: request.one_sequence,
             strict: request.strict,
-            fps: request.fps.or(job.fps).unwrap_or(animation::FPS),
-            clip: request.clip.as_ref().unwrap_or(&job.clip),
+            fps: if job_wins { job.fps.or(request.fps) } else { request.fps.or(job.fps) }
+                .unwrap_or(animation::FPS),
+            clip: match &request.clip {
+                Some(clip) if !job_wins || job.clip == ClipChoice::Auto => clip,
+                _ => &job.clip,
+            },
         }
     }
 
@@ -188,8 +203,8 @@ impl Resolving<'_> {
         }
     }
 
-    /// Defaults, then the job, then its overrides in turn, then the command line. An override of files is for
-    /// pictures that show one of them.
+    /// Defaults, then the job, then its overrides in turn, then the command line, which for a dropped job comes before it.
+    /// An override of files is for pictures that show one of them.
     fn settings(
         &mut self,
         job: &JobFile,
@@ -201,12 +216,23 @@ impl Resolving<'_> {
         if let Some(settings) = self.settings.get(&applying) {
             return Ok(Arc::clone(settings));
         }
-        let mut options = job.options.clone();
-        for &i in &applying {
-            options.lay_over(&job.overrides[i].options);
+        let is_dropped = self.request.dropped.is_some();
+        let own = applying.iter().map(|&i| &job.overrides[i].options);
+        let own = std::iter::once(&job.options).chain(own);
+        let mut options = if is_dropped { self.request.options.clone() } else { Options::default() };
+        for over in own {
+            if is_dropped && over.camera.is_some() {
+                // else what was typed would win over the job's camera
+                (options.eye, options.look_at) = (None, None);
+            }
+            options.lay_over(over);
         }
-        options.lay_over(&self.request.options);
-        let settings = Settings::new(&options).map(Arc::new).map_err(JobError::Options)?;
+        if !is_dropped {
+            options.lay_over(&self.request.options);
+        }
+        let mut settings = Settings::new(&options).map_err(JobError::Options)?;
+        settings.read.within.clone_from(&self.request.dropped);
+        let settings = Arc::new(settings);
         if let Some(text) = settings.left_out() {
             self.warnings.add(None, None, text);
         }
@@ -240,10 +266,11 @@ impl Resolving<'_> {
     /// `--frames`, else the job's, then `--chunk`, then `--order`. Names are compared before the chunk is taken: all
     /// chunks write into one folder.
     fn choose(&mut self, of_job: Option<&FrameSet>) -> Result<(), JobError> {
-        if let Some(set) = self.request.frames.as_ref().or(of_job) {
+        let typed = self.request.frames.as_ref();
+        if let Some(set) = if self.request.dropped.is_some() { of_job.or(typed) } else { typed.or(of_job) } {
             let mut numbers: Vec<i64> = self.pictures.iter().filter_map(|p| p.frame).collect();
             numbers.sort_unstable();
-            if let Some(missing) = set.first_not_in(&numbers) {
+            if let Some(missing) = set.first_not_in(&numbers).filter(|_| !self.request.grows) {
                 return Err(JobError::NoSuchFrame(missing));
             }
             self.pictures.retain(|p| p.frame.is_some_and(|f| set.contains(f)));

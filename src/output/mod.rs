@@ -29,6 +29,7 @@ pub use difference::first_difference;
 pub use encoding::{Bits, Encoding, Format, PictureFile, file_names, picture_files};
 pub use error::OutputError;
 pub use finish::{clean_up, finish, foreign};
+pub use owner::{is_gone, own_name};
 pub use read::read_picture;
 pub use records::Records;
 pub use run_log::RunLog;

@@ -9,7 +9,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 const AGE_MAX_NS: u128 = 24 * 3_600 * 1_000_000_000;
 
 /// A new name of this process, never given before by it.
-pub(super) fn own_name(prefix: &str, suffix: &str) -> String {
+pub fn own_name(prefix: &str, suffix: &str) -> String {
     static NAMES: AtomicU64 = AtomicU64::new(0);
     let n = NAMES.fetch_add(1, Ordering::Relaxed);
     let host = this_host().unwrap_or("unknown");
@@ -20,8 +20,23 @@ pub(super) fn own_name(prefix: &str, suffix: &str) -> String {
 pub(super) fn is_dead(path: &Path, prefix: &str, suffix: &str) -> bool {
     let name = path.file_name().and_then(|n| n.to_str());
     let Some((host, pid)) = name.and_then(|name| owner(name, prefix, suffix)) else { return false };
-    let gone = this_host() == Some(host) && !Path::new(&format!("/proc/{pid}")).exists();
-    gone || is_old(path)
+    is_gone_from(host, pid) || is_old(path)
+}
+
+/// Whether the process of a name that [`own_name`] made without prefix and suffix has ended; known on this host alone.
+pub fn is_gone(name: &str) -> bool {
+    owner(name, "", "").is_some_and(|(host, pid)| is_gone_from(host, pid))
+}
+
+fn is_gone_from(host: &str, pid: u32) -> bool {
+    this_host() == Some(host) && !is_running(pid)
+}
+
+/// A process that has ended and for whose exit status nobody has asked runs no more (proc(5): its state is Z).
+fn is_running(pid: u32) -> bool {
+    let Ok(stat) = std::fs::read_to_string(format!("/proc/{pid}/stat")) else { return false };
+    let state = stat.rsplit(')').next().and_then(|rest| rest.trim_start().chars().next());
+    !matches!(state, Some('Z' | 'X'))
 }
 
 fn owner<'a>(name: &'a str, prefix: &str, suffix: &str) -> Option<(&'a str, u32)> {

@@ -26,6 +26,7 @@ pub(super) struct JobFile {
     pub(super) layers: Vec<LayerFile>,
     pub(super) frames: Option<FrameSet>,
     pub(super) folder: Option<PathBuf>,
+    pub(super) priority: Option<i64>,
     pub(super) fps: Option<f64>,
     pub(super) clip: ClipChoice,
     pub(super) options: Options,
@@ -121,9 +122,6 @@ fn parse(yaml: &str, said_in: &Path) -> Read<JobFile> {
         Value::Number(1.0) => Ok(()),
         _ => Err(Wrong::at(node, "this version of rentix reads job files of version 1")),
     })?;
-    // that is for the daemon; here it is only checked
-    job.get("priority", whole(limits::FRAME))?;
-
     match (job.node("sequence"), job.node("layers")) {
         (None, None) => return Err(Wrong::at(&root, "a job needs either `sequence` or `layers`")),
         (Some(_), Some(layers)) => {
@@ -137,6 +135,7 @@ fn parse(yaml: &str, said_in: &Path) -> Read<JobFile> {
         sequence: job.get("sequence", path)?,
         layers: job.get("layers", |node| layers(node, said_in))?.unwrap_or_default(),
         frames: job.get("frames", frames)?,
+        priority: job.get("priority", whole(limits::FRAME))?.map(|x| x as i64),
         fps: job.get("fps", number(limits::FPS))?,
         clip: job.get("clip", text)?.map(|word| ClipChoice::from_word(&word)).unwrap_or_default(),
         options: scene_options(&job, said_in)?,

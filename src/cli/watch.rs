@@ -1,0 +1,168 @@
+//! `rentix watch`.
+
+use super::progress::ProgressKind;
+use super::render::{devices, end_json, event_json, run_options};
+use super::render_args::RenderArgs;
+use super::{EXIT_FAILED, Global, request, stop};
+use crate::job::Request;
+use crate::run::Event;
+use crate::watch::{self, Notices, State, WatchEvent, WatchOptions};
+use anyhow::{Result, bail};
+use clap::Args;
+use std::net::SocketAddr;
+use std::process::ExitCode;
+use std::time::Duration;
+
+/// What `watch` takes beside the options of `render`, which are defaults for jobs that do not say.
+#[derive(Args, Debug)]
+#[allow(clippy::doc_markdown, reason = "this is what --help shows, as it stands")]
+pub(super) struct WatchArgs {
+    #[command(flatten)]
+    pub render: RenderArgs,
+
+    /// A job is whole when nothing in it has changed for so many seconds [default: 2]
+    #[arg(long, value_name = "SECONDS", help_heading = "Watching")]
+    pub settle: Option<f64>,
+    /// Render frames of sequences that are still growing, as they come
+    #[arg(long, help_heading = "Watching")]
+    pub follow: bool,
+    /// End when every job present is finished, failed or cancelled
+    #[arg(long, help_heading = "Watching")]
+    pub once: bool,
+    /// Priority of jobs that say nothing of it; higher first [default: 0]
+    #[arg(long, value_name = "N", allow_negative_numbers = true, help_heading = "Watching")]
+    pub priority: Option<i64>,
+    /// Serve a status page (also /metrics for Prometheus, /healthz), as 127.0.0.1:8080
+    #[arg(long, value_name = "ADDRESS", help_heading = "Watching")]
+    pub listen: Option<SocketAddr>,
+    /// Run a command for each job that finished or failed (RENTIX_JOB, RENTIX_STATE, RENTIX_FOLDER, RENTIX_FRAMES, RENTIX_FAILED, RENTIX_ERROR; its status on stdin)
+    #[arg(long, value_name = "CMD", help_heading = "Watching")]
+    pub on_done: Option<String>,
+    /// Post the status of each job that finished or failed, as JSON
+    #[arg(long, value_name = "URL", help_heading = "Watching")]
+    pub webhook: Option<String>,
+    /// Mail to an address about each job that finished or failed
+    #[arg(long, value_name = "ADDRESS", help_heading = "Watching")]
+    pub mail: Option<String>,
+    /// The server that sends mail: smtp://HOST, smtps://USER:PASSWORD@HOST [default: RENTIX_SMTP, else smtp://localhost]
+    #[arg(long, value_name = "URL", help_heading = "Watching")]
+    pub smtp: Option<String>,
+}
+
+/// Whether `watch` takes an option of `render`: not those that one run alone has.
+pub(super) const NOT_TAKEN: [&str; 7] = ["job", "chunk", "report", "progress", "dry_run", "cold", "order"];
+
+/// No job rests longer before it begins.
+const SETTLE_MAX_S: f64 = 86_400.0;
+
+/// Watches a folder and renders what is put into it.
+pub(super) fn watch(args: &WatchArgs, global: &Global) -> Result<ExitCode> {
+    // first of all: whoever starts a daemon may stop it at once
+    let stop = stop::on_signals()?;
+    let render = &args.render;
+    let [inbox] = render.inputs.as_slice() else {
+        bail!("one INBOX is watched; start another daemon for another one");
+    };
+    let asks_for_one_run = render.job.is_some()
+        || render.chunk.is_some()
+        || render.report.is_some()
+        || render.dry_run
+        || render.cold
+        || render.order.is_some()
+        || render.progress != ProgressKind::Auto;
+    if asks_for_one_run {
+        bail!("--job, --chunk, --order, --report, --progress, --cold and --dry-run are for `rentix render`");
+    }
+    let settle_s = args.settle.unwrap_or(2.0);
+    if !(0.0..=SETTLE_MAX_S).contains(&settle_s) {
+        bail!("--settle: {settle_s} is out of range: allowed from 0 to {SETTLE_MAX_S}");
+    }
+    let run = run_options(render);
+    let devices = devices(render, &run)?;
+    let smtp = args.smtp.clone().or_else(|| std::env::var("RENTIX_SMTP").ok().filter(|url| !url.is_empty()));
+    let options = WatchOptions {
+        inbox: inbox.clone(),
+        out: render.output.clone().unwrap_or_else(|| "out".into()),
+        settle: Duration::from_secs_f64(settle_s),
+        follow: args.follow,
+        once: args.once,
+        priority: args.priority.unwrap_or(0),
+        defaults: Request { inputs: Vec::new(), folder: None, ..request::request(render)? },
+        run,
+        listen: args.listen,
+        notices: Notices {
+            on_done: args.on_done.clone(),
+            webhook: args.webhook.clone(),
+            mail: args.mail.clone(),
+            smtp,
+        },
+    };
+    let ended = watch::watch(&options, devices, &stop.asked, &mut |event| {
+        if global.json {
+            println!("{}", as_json(event));
+        } else {
+            tell(event, global);
+        }
+    })?;
+    Ok(if ended.stopped {
+        ExitCode::from(stop.exit_status())
+    } else if ended.failed > 0 {
+        ExitCode::from(EXIT_FAILED)
+    } else {
+        ExitCode::SUCCESS
+    })
+}
+
+/// For people: a line for each state that matters, and for each frame that failed.
+fn tell(event: &WatchEvent<'_>, global: &Global) {
+    match event {
+        WatchEvent::Ready(at) if !global.quiet => match at {
+            Some(at) => eprintln!("watching; the status page is at http://{at}/"),
+            None => eprintln!("watching"),
+        },
+        WatchEvent::State(status) => {
+            let (job, word, frames) = (&status.job, status.state.word(), &status.frames);
+            match (status.state, &status.error) {
+                (State::Failed, error) => {
+                    eprintln!("{job}: failed: {}", error.as_deref().unwrap_or("no reason is known"));
+                }
+                _ if global.quiet => {}
+                (State::Finished, _) => eprintln!("{job}: finished, {} frames", frames.done),
+                (State::Cancelled, Some(error)) => eprintln!("{job}: cancelled: {error}"),
+                (State::Running | State::Queued, _) => eprintln!("{job}: {word}"),
+                _ if global.verbose => eprintln!("{job}: {word}"),
+                _ => {}
+            }
+        }
+        WatchEvent::Run(job, Event::Frame(frame)) => match &frame.error {
+            Some(error) => eprintln!("{job}: error: {error}"),
+            None if global.verbose => eprintln!("{job}: {}: {:?}", frame.picture, frame.status),
+            None => {}
+        },
+        WatchEvent::Run(job, Event::Warning(warning)) if !global.quiet => {
+            eprintln!("{job}: warning: {warning}");
+        }
+        WatchEvent::Note(text) => eprintln!("{text}"),
+        _ => {}
+    }
+}
+
+fn as_json(event: &WatchEvent<'_>) -> serde_json::Value {
+    let of = |job: &str, mut value: serde_json::Value| {
+        value["job"] = job.into();
+        value
+    };
+    match event {
+        WatchEvent::Ready(at) => {
+            serde_json::json!({"event": "ready", "page": at.map(|at| format!("http://{at}/"))})
+        }
+        WatchEvent::State(status) => {
+            let mut value = serde_json::to_value(status).unwrap_or_default();
+            value["event"] = "state".into();
+            value
+        }
+        WatchEvent::Run(job, event) => of(job, event_json(event)),
+        WatchEvent::Ended(job, outcome) => of(job, end_json(outcome)),
+        WatchEvent::Note(text) => serde_json::json!({"event": "note", "text": text}),
+    }
+}

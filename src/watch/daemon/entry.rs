@@ -1,0 +1,101 @@
+//! What is known of one thing in the inbox.
+
+use super::session::Session;
+use crate::device::Stop;
+use crate::watch::claim::Claim;
+use crate::watch::inbox::Found;
+use crate::watch::settle::Settling;
+use crate::watch::state::{State, Status};
+use std::sync::Arc;
+use std::time::Duration;
+
+/// What is being done with it here.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Phase {
+    /// It may still grow.
+    Settling,
+    /// It is whole and being looked into.
+    Examining,
+    /// It waits for its turn.
+    Queued,
+    /// It is being rendered.
+    Running,
+    /// Nothing, until it changes.
+    Ended,
+}
+
+/// One thing in the inbox.
+#[derive(Debug)]
+pub(super) struct Entry {
+    pub(super) found: Found,
+    /// Whether its job has its name; until then the status is not written.
+    pub(super) named: bool,
+    pub(super) settling: Option<Settling>,
+    /// When it was last looked at.
+    pub(super) looked: Option<Duration>,
+    pub(super) phase: Phase,
+    pub(super) status: Status,
+    /// The state that was written last.
+    pub(super) written: Option<State>,
+    /// Whether the status is to be written.
+    pub(super) dirty: bool,
+    /// When it was written last.
+    pub(super) wrote: Duration,
+    /// Nothing is tried before.
+    pub(super) retry: Duration,
+    pub(super) claim: Option<Claim>,
+    /// Asks what is being rendered of it to stop.
+    pub(super) stop: Option<Arc<Stop>>,
+    /// Its owner does not want it: why.
+    pub(super) unwanted: Option<String>,
+    /// It is not in the inbox any more.
+    pub(super) gone: bool,
+    /// Its growing sequence, where it is followed.
+    pub(super) session: Option<Session>,
+    /// The first frame of its run that failed, and why.
+    pub(super) first_error: Option<String>,
+}
+
+impl Entry {
+    pub(super) fn new(found: Found) -> Self {
+        let source = found.file.to_string_lossy().into_owned();
+        Self {
+            found,
+            named: false,
+            settling: None,
+            looked: None,
+            phase: Phase::Settling,
+            status: Status { source, ..Status::default() },
+            written: None,
+            dirty: false,
+            wrote: Duration::ZERO,
+            retry: Duration::ZERO,
+            claim: None,
+            stop: None,
+            unwanted: None,
+            gone: false,
+            session: None,
+            first_error: None,
+        }
+    }
+
+    /// Comes into a state, to be written.
+    pub(super) fn enter(&mut self, state: State, error: Option<String>) {
+        self.status.enter(state, error);
+        self.dirty = true;
+        if state.is_end() {
+            self.phase = Phase::Ended;
+            self.session = None;
+        }
+    }
+
+    /// Whether nothing more is to be done with it, as far as it is known. An empty folder is not yet a job.
+    pub(super) fn is_over(&self) -> bool {
+        let is_empty = self.phase == Phase::Settling && self.settling.is_some_and(|s| s.seen().files == 0);
+        !self.dirty && (self.phase == Phase::Ended || is_empty && self.looked.is_some())
+    }
+
+    pub(super) fn has_failed(&self) -> bool {
+        self.phase == Phase::Ended && self.status.state == State::Failed
+    }
+}

@@ -1,0 +1,286 @@
+//! Scanning: what is in the inbox, what changed, what is whole.
+
+use super::entry::{Entry, Phase};
+use super::{AGAIN, Daemon, SCAN_EVERY};
+use crate::watch::inbox::{self, Found, Kind};
+use crate::watch::settle::{Seen, Settling};
+use crate::watch::state::{State, Status, now_ms};
+use std::collections::HashSet;
+use std::ffi::OsString;
+use std::time::Duration;
+
+/// What has settled is looked at again after so long, where no event told of a change.
+const REST: Duration = Duration::from_secs(5);
+/// A scan looks at jobs for so long, the others' turn comes with the next.
+const LOOKS: Duration = SCAN_EVERY[1];
+/// A followed sequence without `.done` is whole when it has rested so many times longer than other jobs.
+const FOLLOWED_RESTS: u32 = 30;
+/// So many times with `--once`, which nobody wants to wait for: as long as a frame without a final newline.
+const FOLLOWED_RESTS_ONCE: u32 = 5;
+
+impl Daemon<'_> {
+    pub(super) fn scan(&mut self) {
+        let inbox = match inbox::list(&self.options.inbox) {
+            Ok(inbox) => inbox,
+            Err(error) => {
+                self.listed = false;
+                return self.in_the_way(&error.to_string());
+            }
+        };
+        self.others.retain(|file| inbox.others.contains(file));
+        for file in inbox.others {
+            if !self.others.contains(&file) {
+                let text = format!(
+                    "{}: is neither a folder nor a .zip, .tar, .tar.gz or .tar.zst; it is left alone",
+                    self.options.inbox.join(&file).display()
+                );
+                self.note(&text);
+                self.others.insert(file);
+            }
+        }
+        let there: HashSet<&OsString> = inbox.jobs.iter().map(|found| &found.file).collect();
+        let gone: Vec<u64> =
+            self.by_file.iter().filter(|(file, _)| !there.contains(file)).map(|(_, id)| *id).collect();
+        for id in gone {
+            self.gone(id);
+        }
+        for found in inbox.jobs {
+            self.meet(found);
+        }
+        let hinted: HashSet<u64> =
+            self.hints.take().iter().filter_map(|name| self.by_file.get(name)).copied().collect();
+        let now = self.now();
+        let mut due: Vec<(bool, Option<Duration>, u64)> = self
+            .entries
+            .iter()
+            .filter(|(_, e)| !e.gone)
+            .map(|(id, e)| (!hinted.contains(id), e, *id))
+            .filter(|(is_not_hinted, e, _)| {
+                let is_watched = e.phase == Phase::Settling || e.phase == Phase::Running;
+                !is_not_hinted || is_watched || e.looked.is_none_or(|at| now.saturating_sub(at) >= REST)
+            })
+            .map(|(is_not_hinted, e, id)| (is_not_hinted, e.looked, id))
+            .collect();
+        // what waits longest comes first
+        due.sort_unstable();
+        self.listed = true;
+        for (_, _, id) in due {
+            if self.now().saturating_sub(now) > LOOKS {
+                self.listed = false;
+                break;
+            }
+            self.look_at(id);
+        }
+    }
+
+    fn meet(&mut self, found: Found) {
+        if let Some(id) = self.by_file.get(&found.file) {
+            let known = &mut self.entries.get_mut(id);
+            if known.as_ref().is_some_and(|e| e.found.kind == found.kind) {
+                return;
+            }
+            // a folder in place of an archive, or the other way round: another job of that name
+            let id = *id;
+            return self.gone(id);
+        }
+        self.last_id += 1;
+        self.by_file.insert(found.file.clone(), self.last_id);
+        self.entries.insert(self.last_id, Entry::new(found));
+    }
+
+    /// What was in the inbox and is not any more.
+    fn gone(&mut self, id: u64) {
+        let Some(entry) = self.entries.get_mut(&id) else { return };
+        entry.gone = true;
+        self.by_file.remove(&entry.found.file);
+        if !entry.named || entry.phase == Phase::Ended && !entry.dirty {
+            self.entries.remove(&id);
+        } else if entry.phase != Phase::Ended {
+            self.cancel(id, "it was taken out of the inbox");
+        }
+    }
+
+    fn look_at(&mut self, id: u64) {
+        let now = self.now();
+        let Some(entry) = self.entries.get_mut(&id) else { return };
+        entry.looked = Some(now);
+        let seen = match inbox::look(&self.options.inbox, &entry.found) {
+            Ok(seen) => seen,
+            Err(error) => {
+                let path = self.options.inbox.join(&entry.found.file);
+                if !path.exists() {
+                    return;
+                }
+                let text = format!("{}: cannot be read: {error}; it is waited for", path.display());
+                return self.note(&text);
+            }
+        };
+        let is_other = if let Some(settling) = &mut entry.settling {
+            settling.see(seen, now)
+        } else {
+            entry.settling = Some(Settling::new(seen, now));
+            true
+        };
+        if seen.files == 0 && !entry.named {
+            return;
+        }
+        if !entry.named && !self.name(id, &seen) {
+            return;
+        }
+        self.changed(id, seen, is_other);
+    }
+
+    /// What a look means for a job that has its name.
+    fn changed(&mut self, id: u64, seen: Seen, is_other: bool) {
+        let now = self.now();
+        let run = run_word(&seen);
+        let Some(entry) = self.entries.get_mut(&id) else { return };
+        match entry.phase {
+            Phase::Ended => {
+                let is_wanted_again = entry.status.state == State::Cancelled && !seen.cancelled;
+                if is_wanted_again || entry.status.run != run && !seen.cancelled {
+                    entry.phase = Phase::Settling;
+                    entry.unwanted = None;
+                    entry.enter(State::Received, None);
+                }
+                return;
+            }
+            _ if seen.cancelled => return self.cancel(id, "its owner cancelled it"),
+            Phase::Examining | Phase::Queued if is_other => {
+                entry.phase = Phase::Settling;
+                entry.enter(State::Received, None);
+            }
+            _ => {}
+        }
+        if entry.phase != Phase::Settling {
+            return;
+        }
+        let settle = self.options.settle;
+        let follows = self.options.follow && entry.found.kind == Kind::Folder;
+        let mut span = settle;
+        if follows {
+            span *= if self.options.once { FOLLOWED_RESTS_ONCE } else { FOLLOWED_RESTS };
+            let path = self.options.inbox.join(&entry.found.file);
+            let session = entry.session.get_or_insert_default();
+            if session.fits == Some(false) {
+                span = settle;
+            } else if let Err(error) = session.look(&path, seen.done, settle, now) {
+                return self.note(&format!("{}: cannot be read: {error}; it is waited for", path.display()));
+            }
+        }
+        let is_rendering = self.current == Some(id);
+        if entry.settling.is_some_and(|s| s.is_settled(span, now)) && !is_rendering {
+            self.accept(id, run);
+        } else if entry.session.as_ref().is_some_and(|s| s.fits.is_none() && !s.ready.is_empty()) {
+            self.see_whether_it_fits(id);
+        }
+    }
+
+    fn accept(&mut self, id: u64, run: String) {
+        let Some(entry) = self.entries.get_mut(&id) else { return };
+        entry.status.run.clone_from(&run);
+        entry.session = None;
+        entry.phase = Phase::Examining;
+        entry.enter(State::Accepted, None);
+        let place = self.place(&self.entries[&id]);
+        self.intake.examine(id, run, place);
+    }
+
+    /// Whether a job that grows can be followed; where that cannot be told yet it is asked again.
+    fn see_whether_it_fits(&mut self, id: u64) {
+        let Some(entry) = self.entries.get(&id) else { return };
+        let job = crate::watch::job::prepare(&self.place(entry), &self.defaults, true);
+        let priority = self.options.priority;
+        if let Ok(job) = job
+            && let Some(entry) = self.entries.get_mut(&id)
+            && let Some(session) = &mut entry.session
+        {
+            session.fits = Some(crate::watch::follow_run::can_follow(&job));
+            entry.status.priority = job.priority.unwrap_or(priority);
+        }
+    }
+
+    /// Finds a name for a job, and what is known of it; false where that must wait.
+    fn name(&mut self, id: u64, seen: &Seen) -> bool {
+        let now = self.now();
+        let Some(entry) = self.entries.get(&id).filter(|e| e.retry <= now) else { return false };
+        let (base, source) = (entry.found.name.clone(), entry.status.source.clone());
+        for n in 1.. {
+            let name = if n == 1 { base.clone() } else { format!("{base}-{n}") };
+            let known = match Status::read(&self.options.out.join(&name)) {
+                Some(known) if known.source == source => Some(known),
+                Some(_) => continue,
+                None => None,
+            };
+            if let Some(known) = known {
+                return self.go_on(id, known, seen);
+            }
+            let claim = match self.claims.take(&name, now) {
+                Ok(Some(claim)) => claim,
+                // another daemon is just giving it to a job, perhaps to this one
+                Ok(None) => return self.later(id),
+                Err(error) => {
+                    self.in_the_way(&error.to_string());
+                    return self.later(id);
+                }
+            };
+            if Status::read(&self.options.out.join(&name)).is_some() {
+                claim.give_back();
+                return self.later(id);
+            }
+            let received_ms = self.received.get(&name).copied().unwrap_or_else(now_ms);
+            let Some(entry) = self.entries.get_mut(&id) else { return false };
+            entry.named = true;
+            entry.claim = Some(claim);
+            entry.status.job = name;
+            entry.status.times.received_ms = received_ms;
+            entry.enter(State::Received, None);
+            return true;
+        }
+        false
+    }
+
+    /// Goes on with what an earlier daemon, or another one, wrote.
+    fn go_on(&mut self, id: u64, known: Status, seen: &Seen) -> bool {
+        let run = run_word(seen);
+        let Some(entry) = self.entries.get_mut(&id) else { return false };
+        entry.named = true;
+        entry.written = Some(known.state);
+        let has_ended = known.ended(&run);
+        entry.status = known;
+        if has_ended {
+            entry.phase = Phase::Ended;
+        }
+        true
+    }
+
+    fn later(&mut self, id: u64) -> bool {
+        let retry = self.now() + AGAIN / 4;
+        if let Some(entry) = self.entries.get_mut(&id) {
+            entry.retry = retry;
+        }
+        false
+    }
+
+    /// Ends a job that is not wanted any more: at once, or when what is being rendered of it has stopped.
+    fn cancel(&mut self, id: u64, why: &str) {
+        let is_rendering = self.current == Some(id);
+        let Some(entry) = self.entries.get_mut(&id) else { return };
+        if is_rendering {
+            entry.unwanted = Some(why.to_owned());
+            if let Some(stop) = &entry.stop {
+                stop.ask();
+            }
+            return;
+        }
+        if let Some(settling) = &entry.settling {
+            entry.status.run = run_word(settling.seen());
+        }
+        entry.enter(State::Cancelled, Some(why.to_owned()));
+    }
+}
+
+/// The word of a settled set in a status.
+fn run_word(seen: &Seen) -> String {
+    format!("{:032x}", seen.run)
+}

@@ -1,0 +1,140 @@
+//! The part of a growing sequence that was seen, and what of it was rendered.
+
+use crate::watch::follow::{Frames, Stamp};
+use crate::watch::{follow_run, inbox};
+use std::collections::{BTreeMap, HashMap, HashSet};
+use std::ffi::{OsStr, OsString};
+use std::io;
+use std::path::Path;
+use std::time::Duration;
+
+/// A followed job.
+#[derive(Debug, Default)]
+pub(super) struct Session {
+    frames: Frames,
+    /// Files that were handed over, as they were then.
+    handed: HashMap<OsString, Stamp>,
+    /// Those that are whole and were not.
+    pub(super) ready: HashSet<OsString>,
+    /// Whether it can be followed; None: not looked into yet.
+    pub(super) fits: Option<bool>,
+    /// Frame files there.
+    pub(super) all: u64,
+}
+
+impl Session {
+    /// Looks at the files of a folder now.
+    pub(super) fn look(
+        &mut self,
+        folder: &Path,
+        done: bool,
+        settle: Duration,
+        now: Duration,
+    ) -> io::Result<()> {
+        let root = inbox::root(folder)?;
+        let files = inbox::obj_files(&root)?;
+        self.all = files.len() as u64;
+        self.frames.see(&files, now);
+        self.ready.retain(|name| files.contains_key(name));
+        let mut order: Vec<(Key, &OsString)> = files.keys().map(|name| (key(name), name)).collect();
+        order.sort();
+        // where the camera and the light stand follows from the first frame
+        let mut first_is_whole = false;
+        for (at, (of, name)) in order.iter().enumerate() {
+            let stamp = self.frames.stamp(name);
+            let was_handed = self.handed.get(*name).copied() == stamp;
+            let next = order.get(at + 1).is_some_and(|(after, _)| after.text == of.text);
+            let is_whole = was_handed
+                || self
+                    .frames
+                    .is_whole(name, next, done, settle, now, || follow_run::ends_whole(&root.join(name)));
+            first_is_whole |= at == 0 && is_whole;
+            if !first_is_whole {
+                break;
+            }
+            if is_whole && !was_handed {
+                self.ready.insert((*name).clone());
+            } else {
+                self.ready.remove(*name);
+            }
+        }
+        Ok(())
+    }
+
+    /// Takes the files that are ready.
+    pub(super) fn hand_over(&mut self) -> HashSet<OsString> {
+        let ready = std::mem::take(&mut self.ready);
+        let stamps: BTreeMap<_, _> =
+            ready.iter().filter_map(|n| Some((n.clone(), self.frames.stamp(n)?))).collect();
+        self.handed.extend(stamps);
+        ready
+    }
+}
+
+/// The order of frames: by the text of their names, then by the numbers in them.
+#[derive(Debug, PartialEq, Eq, PartialOrd, Ord)]
+struct Key {
+    text: String,
+    numbers: Vec<u64>,
+}
+
+fn key(name: &OsStr) -> Key {
+    let name = name.to_string_lossy();
+    let digits = |c: char| c.is_ascii_digit();
+    let numbers = name.split(|c| !digits(c)).filter(|run| !run.is_empty());
+    Key {
+        text: name.chars().filter(|c| !digits(*c)).collect(),
+        // a run of more digits than a number has comes last
+        numbers: numbers.map(|run| run.parse().unwrap_or(u64::MAX)).collect(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::fs;
+
+    #[test]
+    fn frames_come_as_they_are_whole_each_once() {
+        let t = tempfile::tempdir().unwrap();
+        let settle = Duration::from_secs(2);
+        let at = Duration::from_secs_f64;
+        let put = |name: &str, text: &str| fs::write(t.path().join(name), text).unwrap();
+        let mut s = Session::default();
+        let look = |s: &mut Session, now: f64| {
+            s.look(t.path(), false, settle, at(now)).unwrap();
+            let mut ready: Vec<_> = s.hand_over().into_iter().map(|n| n.into_string().unwrap()).collect();
+            ready.sort();
+            ready
+        };
+        put("a_9.obj", "v 0 0 0\n");
+        assert!(look(&mut s, 0.0).is_empty());
+        put("a_10.obj", "v 0 0");
+        // half the span, as the next frame is there
+        assert_eq!(look(&mut s, 1.0), ["a_9.obj"]);
+        assert!(look(&mut s, 3.0).is_empty(), "no newline");
+        put("a_10.obj", "v 0 0 0\n");
+        assert!(look(&mut s, 3.5).is_empty() && look(&mut s, 5.4).is_empty());
+        assert_eq!(look(&mut s, 5.5), ["a_10.obj"]);
+        assert!(look(&mut s, 99.0).is_empty(), "each once");
+        put("a_10.obj", "v 0 0 0\nv 1 0 0\n");
+        assert!(look(&mut s, 100.0).is_empty());
+        assert_eq!(look(&mut s, 102.0), ["a_10.obj"], "another content");
+        assert_eq!(s.all, 2);
+    }
+
+    #[test]
+    fn nothing_begins_before_the_first_frame_is_whole() {
+        let t = tempfile::tempdir().unwrap();
+        let mut s = Session::default();
+        fs::write(t.path().join("a_1.obj"), "v 0").unwrap();
+        fs::write(t.path().join("a_2.obj"), "v 0 0 0\n").unwrap();
+        let settle = Duration::from_secs(2);
+        for now in [0, 2, 4] {
+            s.look(t.path(), false, settle, Duration::from_secs(now)).unwrap();
+            assert!(s.ready.is_empty());
+        }
+        s.look(t.path(), false, settle, Duration::from_secs(5)).unwrap();
+        assert_eq!(s.ready.len(), 2, "after five times half the span");
+    }
+}

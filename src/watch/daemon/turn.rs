@@ -1,0 +1,263 @@
+//! Whose turn it is, and what becomes of it.
+
+use super::entry::{Entry, Phase};
+use super::{AGAIN, Daemon};
+use crate::device::Stop;
+use crate::run::{Event, FrameReport, Outcome};
+use crate::watch::inbox::Kind;
+use crate::watch::renderer::{Order, Told};
+use crate::watch::state::{FrameCounts, State, Status};
+use crate::watch::{WatchEvent, cannot, job};
+use std::cmp::Reverse;
+use std::fs;
+use std::io::{ErrorKind, Write};
+use std::path::PathBuf;
+use std::sync::Arc;
+
+/// What must fit onto the disk before it is thought to have space again.
+const SPACE_BYTES: usize = 1 << 20;
+
+impl Daemon<'_> {
+    /// What the intake found.
+    pub(super) fn examined(&mut self, id: u64, run: &str, examined: Result<Option<i64>, String>) {
+        let priority = self.options.priority;
+        let Some(entry) = self.entries.get_mut(&id) else { return };
+        if entry.phase != Phase::Examining || entry.status.run != run {
+            // it changed meanwhile
+            return;
+        }
+        match examined {
+            Ok(asked) => {
+                entry.status.priority = asked.unwrap_or(priority);
+                entry.phase = Phase::Queued;
+                entry.enter(State::Queued, None);
+            }
+            Err(why) => entry.enter(State::Failed, Some(why)),
+        }
+    }
+
+    /// Begins the job whose turn it is: of the highest priority, then the one that came first.
+    pub(super) fn take_turns(&mut self) {
+        while self.current.is_none() && !self.stopping && self.now() >= self.blocked_until {
+            let now = self.now();
+            let waits = |e: &&Entry| {
+                let grows = e.phase == Phase::Settling
+                    && e.session.as_ref().is_some_and(|s| s.fits == Some(true) && !s.ready.is_empty());
+                e.named && e.retry <= now && !e.gone && (e.phase == Phase::Queued || grows)
+            };
+            let order =
+                |(id, e): &(&u64, &Entry)| (Reverse(e.status.priority), e.status.times.received_ms, **id);
+            let next = self.entries.iter().filter(|(_, e)| waits(e)).min_by_key(order).map(|(id, _)| *id);
+            let Some(id) = next else { return };
+            self.begin(id);
+        }
+    }
+
+    fn begin(&mut self, id: u64) {
+        let now = self.now();
+        let Some(entry) = self.entries.get_mut(&id) else { return };
+        if entry.claim.is_none() {
+            match self.claims.take(&entry.status.job, now) {
+                Ok(Some(claim)) => entry.claim = Some(claim),
+                Ok(None) => {
+                    entry.retry = now + AGAIN / 4;
+                    return;
+                }
+                Err(error) => {
+                    entry.retry = now + AGAIN;
+                    return self.in_the_way(&error.to_string());
+                }
+            }
+        }
+        if self.adopt(id) {
+            return;
+        }
+        let Some(entry) = self.entries.get(&id) else { return };
+        let place = self.place(entry);
+        let followed = self.options.follow && entry.found.kind == Kind::Folder;
+        let stop = Arc::new(Stop::default());
+        let Some(entry) = self.entries.get_mut(&id) else { return };
+        let only = if entry.phase == Phase::Settling {
+            let session = entry.session.as_mut();
+            session.map(|session| {
+                entry.status.frames.all = session.all;
+                session.hand_over()
+            })
+        } else {
+            entry.status.frames = FrameCounts::default();
+            None
+        };
+        entry.first_error = None;
+        entry.stop = Some(Arc::clone(&stop));
+        if only.is_none() {
+            entry.phase = Phase::Running;
+        }
+        if entry.status.state != State::Running {
+            entry.enter(State::Running, None);
+        }
+        let order = Order { id, place, defaults: Arc::clone(&self.defaults), only, followed, stop };
+        self.current = Some(id);
+        if !self.renderer.order(order) {
+            self.told(
+                id,
+                Told::Unfit("the thread that renders has ended; start the daemon again".to_owned()),
+            );
+        }
+    }
+
+    /// Whether another daemon has ended this very run meanwhile; then its word stands.
+    pub(super) fn adopt(&mut self, id: u64) -> bool {
+        let Some(entry) = self.entries.get(&id) else { return false };
+        let known = Status::read(&self.out(entry));
+        let Some(entry) = self.entries.get_mut(&id) else { return false };
+        let ended = known.filter(|k| {
+            !entry.status.run.is_empty() && k.source == entry.status.source && k.ended(&entry.status.run)
+        });
+        let Some(ended) = ended else { return false };
+        entry.written = Some(ended.state);
+        entry.status = ended;
+        entry.phase = Phase::Ended;
+        entry.dirty = false;
+        entry.session = None;
+        if let Some(claim) = entry.claim.take() {
+            claim.give_back();
+        }
+        true
+    }
+
+    /// What the renderer tells.
+    pub(super) fn told(&mut self, id: u64, told: Told) {
+        match told {
+            Told::Event(event) => self.event(id, &event),
+            Told::Ended(outcome) => self.ended(id, &outcome),
+            Told::Unfit(why) => self.stopped(id, Err(why)),
+        }
+    }
+
+    fn event(&mut self, id: u64, event: &Event) {
+        let Some(entry) = self.entries.get_mut(&id) else { return };
+        (self.on_event)(&WatchEvent::Run(&entry.status.job, event));
+        match event {
+            Event::Start { frames, .. } if entry.phase == Phase::Running => {
+                entry.status.frames.all = *frames as u64;
+                entry.dirty = true;
+            }
+            Event::Frame(frame) => self.frame(id, frame),
+            _ => {}
+        }
+    }
+
+    fn frame(&mut self, id: u64, frame: &FrameReport) {
+        let Some(entry) = self.entries.get_mut(&id) else { return };
+        let failed = frame.error.is_some();
+        if failed {
+            entry.status.frames.failed += 1;
+            entry.first_error.get_or_insert_with(|| frame.error.clone().unwrap_or_default());
+        } else {
+            entry.status.frames.done += 1;
+        }
+        entry.dirty = true;
+        let made = self.out(&self.entries[&id]).join(&frame.picture);
+        if let Some(view) = &self.view {
+            let mut view = view.lock();
+            view.frames[usize::from(failed)] += 1;
+            if !failed {
+                view.picture = Some((self.entries[&id].status.job.clone(), made));
+            }
+        }
+    }
+
+    fn ended(&mut self, id: u64, outcome: &Outcome) {
+        if let Some(entry) = self.entries.get_mut(&id) {
+            (self.on_event)(&WatchEvent::Ended(&entry.status.job, outcome));
+        }
+        for device in &outcome.report.devices {
+            if let Some(all) = self.devices.iter_mut().find(|d| d.name == device.name) {
+                all.frames += device.frames;
+                all.busy_s += device.busy_s;
+                all.resident = device.resident.clone();
+            }
+        }
+        self.stopped(id, Ok(outcome));
+    }
+
+    /// What is rendered of a job has come to its end, whatever that is.
+    fn stopped(&mut self, id: u64, end: Result<&Outcome, String>) {
+        self.current = None;
+        let full = match &end {
+            Ok(outcome) if outcome.failed().next().is_none() => None,
+            _ => self.full_disk(),
+        };
+        let Some(entry) = self.entries.get(&id) else { return };
+        let room = self.place(entry).room;
+        let Some(entry) = self.entries.get_mut(&id) else { return };
+        entry.stop = None;
+        let grows = entry.phase == Phase::Settling;
+        if let Some(why) = entry.unwanted.take() {
+            if let Some(settling) = &entry.settling {
+                entry.status.run = format!("{:032x}", settling.seen().run);
+            }
+            entry.enter(State::Cancelled, Some(why));
+        } else if self.stopping || matches!(end, Ok(outcome) if outcome.stopped) {
+            if !grows {
+                entry.phase = Phase::Queued;
+            }
+            entry.enter(State::Queued, None);
+        } else if let Some(why) = full {
+            entry.phase = if grows { Phase::Settling } else { Phase::Queued };
+            entry.session = None;
+            entry.enter(State::Queued, Some(why.clone()));
+            self.blocked_until = self.now() + AGAIN;
+            self.in_the_way(&why);
+        } else if !grows {
+            match end {
+                Err(why) => entry.enter(State::Failed, Some(why)),
+                Ok(outcome) => {
+                    let counts = &mut entry.status.frames;
+                    (counts.failed, counts.done) = (
+                        outcome.report.totals.failed,
+                        outcome.report.totals.frames - outcome.report.totals.failed,
+                    );
+                    let (failed, all) = (counts.failed, counts.all);
+                    if failed == 0 {
+                        entry.enter(State::Finished, None);
+                    } else {
+                        let first = entry.first_error.clone();
+                        let first = first
+                            .or_else(|| outcome.failed().find_map(|f| f.error.clone()))
+                            .unwrap_or_default();
+                        let more = if failed > 1 {
+                            format!("; {failed} of {all} frames are missing")
+                        } else {
+                            String::new()
+                        };
+                        entry.enter(State::Failed, Some(first + &more));
+                    }
+                }
+            }
+        } else if let Err(why) = end {
+            // it may be right once it is whole, which is then tried and told
+            self.note(&why);
+        }
+        if let Err(source) = job::clear(&room) {
+            self.note(&cannot("removed", &room)(source).to_string());
+        }
+    }
+
+    /// Whether the output folder has no space left: what to say then.
+    fn full_disk(&self) -> Option<String> {
+        let path: PathBuf = self.own("space");
+        let written = fs::File::create(&path).and_then(|mut file| {
+            file.write_all(&vec![0xa5; SPACE_BYTES])?;
+            file.sync_data()
+        });
+        let _ = fs::remove_file(&path);
+        let error = written.err()?;
+        let is_full = matches!(
+            error.kind(),
+            ErrorKind::StorageFull | ErrorKind::QuotaExceeded | ErrorKind::ReadOnlyFilesystem
+        );
+        is_full
+            .then(|| format!("{}: {error}; the jobs wait until there is space", self.options.out.display()))
+    }
+}
