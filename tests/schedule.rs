@@ -149,7 +149,9 @@ impl Caller {
         prop_assert!(self.is_present[device] && !lease.frames.is_empty());
         let job = self.jobs.iter().position(|j| j.id == lease.job).unwrap();
         let known = &self.jobs[job];
-        prop_assert!(!known.is_cancelled && known.bytes <= BUDGETS[device] && lease.frames.end <= known.frames);
+        prop_assert!(
+            !known.is_cancelled && known.bytes <= BUDGETS[device] && lease.frames.end <= known.frames
+        );
         for frame in lease.frames {
             prop_assert!(!known.traced.contains(&frame), "traced already");
             prop_assert!(!self.held.iter().flatten().any(|&held| held == (job, frame)), "leased already");

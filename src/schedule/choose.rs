@@ -65,8 +65,10 @@ impl Scheduler {
         let serving = facing.serving.map(|s| s.job).filter(|&job| !facing.holds(job));
         let mut best: Option<Choice> = None;
         for &JobId(id) in facing.resident.iter().chain(&serving) {
-            let can_trace = |one: &&Box<Job>| one.open.len() > 0 && self.fits(device, one);
-            let Some(one) = self.jobs[id].as_ref().filter(can_trace) else { continue };
+            let Some(one) = &self.jobs[id] else { continue };
+            if one.open.len() == 0 || !self.fits(device, one) {
+                continue;
+            }
             let is_cold = serving == Some(JobId(id));
             let choice = Choice { key: Key(one.finish_s()), job: id, is_cold };
             if choice.is_before(best.as_ref()) && self.helps(now_s, device, id, one, 0.0, 0.0) {

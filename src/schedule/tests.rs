@@ -206,7 +206,11 @@ fn what_one_device_measures_its_kind_knows_and_a_slow_one_is_found_out() {
     let first = begin(&mut scheduler, 0.0, 0).unwrap();
     assert_eq!(first.frames.end, 10);
     trace(&mut scheduler, 0, &first, 0.02);
-    assert_eq!(begin(&mut scheduler, 0.2, 1).unwrap().frames.clone().count(), 5, "twice as long as was thought");
+    assert_eq!(
+        begin(&mut scheduler, 0.2, 1).unwrap().frames.clone().count(),
+        5,
+        "twice as long as was thought"
+    );
     for _ in 0..10 {
         let lease = scheduler.lease(0.2, 0).unwrap();
         assert_eq!(lease.job, id);

@@ -4,6 +4,8 @@ mod bound;
 mod queues;
 mod random;
 mod rule;
+#[cfg(test)]
+mod tests;
 mod trace;
 mod world;
 
