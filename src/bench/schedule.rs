@@ -13,12 +13,12 @@ const SEEDS: usize = 32;
 /// Jobs at once on sixteen devices, and jobs at once on how many.
 const LOADS: [usize; 7] = [4, 8, 16, 32, 64, 128, 256];
 const LOADED: usize = 16;
-const SIZES: [(usize, usize); 5] = [(1, 1), (40, 4), (400, 64), (64, 400), (1000, 100)];
+const SIZES: [(usize, usize); 6] = [(1, 1), (40, 4), (8, 16), (400, 64), (64, 400), (1000, 100)];
 const LARGEST: (usize, usize) = (10_000, 1000);
 /// Multiples of a cold start in a job's key; the default is among them.
 const PHIS: [f64; 9] = [0.0, 0.125, 0.25, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0];
 /// Multiples of what others lose by another copy.
-const PRICES: [f64; 7] = [0.25, 1.0, 4.0, 16.0, 64.0, 256.0, 1024.0];
+const PRICES: [f64; 7] = [0.5, 1.0, 2.0, 4.0, 8.0, 32.0, 1024.0];
 
 /// Runs it.
 #[allow(clippy::unnecessary_wraps, reason = "a workload may fail")]
@@ -240,7 +240,7 @@ fn weights(seeds: u64) -> (Table, Chart) {
     let columns: Vec<&str> = columns.iter().map(String::as_str).collect();
     let mut table = Table::new(
         "weights",
-        "Affinity with its weights varied, one at a time: φ, how often a cold start counts in a job's key (default 1), and γ, how often what all lose by another copy counts beside what one job gains by it (default 16).",
+        "Affinity with its weights varied, one at a time: φ, how often a cold start counts in a job's key (default 1), and γ, how often what all lose by another copy counts beside what one job gains by it (default 8).",
         &columns,
     );
     let mut lines =
@@ -286,7 +286,7 @@ fn decisions(bench: &Bench) -> Table {
         "Decisions a second, on one thread: a run of frames leased, made resident and reported.",
         &["decisions/s", "frames", "µs each"],
     );
-    for (jobs, devices) in [(10, 4), (1000, 100), LARGEST] {
+    for (jobs, devices) in [(100, 4), (1000, 100), LARGEST] {
         let most = if bench.options.quick { 50_000 } else { 500_000 };
         let (leases, frames, seconds) = drive(&load(jobs, devices, 0), most);
         let cells = [leases / seconds, frames, seconds / leases * 1e6];
