@@ -1,8 +1,7 @@
-//! Charts as SVG: lines over the frames of a sequence, in panels one above the other.
+//! Charts as SVG: lines over the frames of a sequence, or over what else is varied, in panels one above the other.
 
 use plotters::coord::Shift;
 use plotters::coord::ranged1d::{Ranged, ValueFormatter};
-use plotters::coord::types::RangedCoordf64;
 use plotters::element::PathElement;
 use plotters::prelude::{
     BLACK, Cartesian2d, ChartBuilder, ChartContext, Color, DrawingArea, IntoDrawingArea, IntoLogRange,
@@ -22,6 +21,10 @@ pub(super) struct Line {
 /// Lines over the same axes.
 #[derive(Clone, Debug)]
 pub(super) struct Panel {
+    /// What x is.
+    pub(super) x: String,
+    /// Whether x is logarithmic.
+    pub(super) is_log_x: bool,
     /// What y is, with its unit.
     pub(super) y: String,
     /// Whether y is logarithmic.
@@ -30,7 +33,7 @@ pub(super) struct Panel {
     pub(super) lines: Vec<Line>,
 }
 
-/// Panels over the same frames.
+/// Panels one above the other.
 #[derive(Clone, Debug)]
 pub(super) struct Chart {
     /// Its file name without extension.
@@ -44,10 +47,18 @@ pub(super) struct Chart {
 const SIZE: (u32, u32) = (900, 620);
 pub(super) const FONT: &str = "sans-serif";
 /// Okabe and Ito's palette, which people with any colour vision can tell apart.
-const COLORS: [RGBColor; 4] =
-    [RGBColor(0, 114, 178), RGBColor(230, 159, 0), RGBColor(0, 158, 115), RGBColor(204, 121, 167)];
+const COLORS: [RGBColor; 8] = [
+    RGBColor(0, 114, 178),
+    RGBColor(230, 159, 0),
+    RGBColor(0, 158, 115),
+    RGBColor(204, 121, 167),
+    RGBColor(86, 180, 233),
+    RGBColor(213, 94, 0),
+    RGBColor(240, 228, 66),
+    RGBColor(0, 0, 0),
+];
 /// Widths of lines: where they lie on each other, those below look out.
-const WIDTHS: [u32; 4] = [2, 6, 4, 2];
+const WIDTHS: [u32; 8] = [2, 6, 4, 2, 2, 3, 4, 2];
 
 impl Chart {
     /// The chart as SVG.
@@ -90,30 +101,42 @@ impl Panel {
         let least = points().map(|p| p.1).fold(f64::INFINITY, f64::min);
         let greatest = points().map(|p| p.1).fold(f64::NEG_INFINITY, f64::max);
         let last = points().map(|p| p.0).fold(1.0, f64::max);
-        // the names stand beside the lines
-        let x = 1.0..(last.max(2.0) - 1.0) * 1.14 + 1.0;
         let mut builder = ChartBuilder::on(area);
         builder.margin(12).x_label_area_size(36).y_label_area_size(64);
-        if self.is_log {
-            let [low, high] = [least.min(1.0) / 1.1, greatest.max(1.0) * 1.1];
-            self.lines_on(builder.build_cartesian_2d(x, (low.max(1e-9)..high).log_scale())?)
+        let [low, high] = [least.min(1.0) / 1.1, greatest.max(1.0) * 1.1];
+        let (log_y, y) = ((low.max(1e-9)..high).log_scale(), 0.0..greatest.max(1e-9) * 1.1);
+        // the names stand beside the lines
+        if self.is_log_x {
+            let first = points().map(|p| p.0).fold(last, f64::min).max(1e-9);
+            let x = (first..last.max(first * 2.0) * (last / first).max(2.0).powf(0.14)).log_scale();
+            if self.is_log {
+                self.lines_on(builder.build_cartesian_2d(x, log_y)?)
+            } else {
+                self.lines_on(builder.build_cartesian_2d(x, y)?)
+            }
         } else {
-            self.lines_on(builder.build_cartesian_2d(x, 0.0..greatest.max(1e-9) * 1.1)?)
+            let x = 1.0..(last.max(2.0) - 1.0) * 1.14 + 1.0;
+            if self.is_log {
+                self.lines_on(builder.build_cartesian_2d(x, log_y)?)
+            } else {
+                self.lines_on(builder.build_cartesian_2d(x, y)?)
+            }
         }
     }
 
-    fn lines_on<'a, Y>(
+    fn lines_on<'a, X, Y>(
         &self,
-        mut chart: ChartContext<'a, SVGBackend<'a>, Cartesian2d<RangedCoordf64, Y>>,
+        mut chart: ChartContext<'a, SVGBackend<'a>, Cartesian2d<X, Y>>,
     ) -> Result<(), Box<dyn Error>>
     where
+        X: Ranged<ValueType = f64> + ValueFormatter<f64>,
         Y: Ranged<ValueType = f64> + ValueFormatter<f64>,
     {
         chart
             .configure_mesh()
             .light_line_style(WHITE.mix(0.0))
-            .x_desc("frame")
-            .x_label_formatter(&|x| format!("{x:.0}"))
+            .x_desc(&self.x)
+            .x_label_formatter(&|&x| if x < 1.0 { format!("{x}") } else { format!("{x:.0}") })
             .y_desc(&self.y)
             .label_style((FONT, 13))
             .draw()?;
@@ -144,7 +167,13 @@ mod tests {
     #[test]
     fn a_chart_names_its_lines_and_axes() {
         let line = Line { name: "refit".to_string(), points: vec![(1.0, 1.0), (2.0, 400.0), (3.0, 20.0)] };
-        let panel = |is_log| Panel { y: "cost".to_string(), is_log, lines: vec![line.clone()] };
+        let panel = |is_log| Panel {
+            x: "frame".to_string(),
+            is_log_x: is_log,
+            y: "cost".to_string(),
+            is_log,
+            lines: vec![line.clone()],
+        };
         let chart = Chart {
             name: "c".to_string(),
             title: "Twist".to_string(),

@@ -7,6 +7,7 @@ mod frames;
 mod mitsuba;
 mod policy;
 mod reading;
+mod schedule;
 pub mod sequences;
 mod start;
 mod table;
@@ -70,12 +71,20 @@ pub struct Workload {
 }
 
 /// All of them.
-pub const WORKLOADS: [Workload; 1] = [Workload {
-    name: "updates",
-    tables: &["reading", "trees", "warm", "start", "policy", "frames", "timeline", "refit", "rays"],
-    about: "what a frame costs that follows another: reading, trees, refit or rebuild, the store, devices",
-    run: updates::updates,
-}];
+pub const WORKLOADS: [Workload; 2] = [
+    Workload {
+        name: "updates",
+        tables: &["reading", "trees", "warm", "start", "policy", "frames", "timeline", "refit", "rays"],
+        about: "what a frame costs that follows another: reading, trees, refit or rebuild, the store, devices",
+        run: updates::updates,
+    },
+    Workload {
+        name: "schedule",
+        tables: &["makespan", "slowdown", "starts", "affinity", "load", "weights", "decisions"],
+        about: "frames to devices, simulated: affinity beside the thesis's policies and others on made traces",
+        run: schedule::schedule,
+    },
+];
 
 /// What is told while it goes on.
 #[derive(Debug)]

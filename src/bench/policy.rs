@@ -106,11 +106,15 @@ fn chart(name: &str, ways: &[Vec<FrameReport>; 3]) -> Chart {
         title: name.to_string(),
         panels: vec![
             Panel {
+                x: "frame".to_string(),
+                is_log_x: false,
                 y: "surface-area cost over the last build's".to_string(),
                 is_log: true,
                 lines: lines(|f| f.update.cost_ratio),
             },
             Panel {
+                x: "frame".to_string(),
+                is_log_x: false,
                 y: "update and trace, ms".to_string(),
                 is_log: false,
                 lines: lines(|f| Some(update_and_trace_ms(f))),

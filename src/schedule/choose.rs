@@ -65,7 +65,10 @@ impl Scheduler {
         let serving = facing.serving.map(|s| s.job).filter(|&job| !facing.holds(job));
         let mut best: Option<Choice> = None;
         for &JobId(id) in facing.resident.iter().chain(&serving) {
-            let Some(one) = self.jobs[id].as_ref().filter(|one| one.open.len() > 0) else { continue };
+            let Some(one) = &self.jobs[id] else { continue };
+            if one.open.len() == 0 || !self.fits(device, one) {
+                continue;
+            }
             let is_cold = serving == Some(JobId(id));
             let choice = Choice { key: Key(one.finish_s()), job: id, is_cold };
             if choice.is_before(best.as_ref()) && self.helps(now_s, device, id, one, 0.0, 0.0) {

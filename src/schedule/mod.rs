@@ -12,6 +12,8 @@ mod ranges;
 mod rules;
 mod scheduler;
 pub mod simulation;
+#[cfg(test)]
+mod tests;
 
 pub use rules::Weights;
 pub use scheduler::Scheduler;

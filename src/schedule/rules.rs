@@ -15,7 +15,7 @@ pub struct Weights {
 
 impl Default for Weights {
     fn default() -> Self {
-        Self { phi: 1.0, price: 16.0, batch_s: 0.1 }
+        Self { phi: 1.0, price: 8.0, batch_s: 0.1 }
     }
 }
 

@@ -320,7 +320,9 @@ impl Scheduler {
     pub(super) fn costs(&self, device: usize, job: usize) -> (f64, f64) {
         let facing = &self.devices[device];
         let costs = self.jobs[job].as_ref().map(|one| one.estimates[facing.facts.kind].costs);
-        costs.map_or((1.0, 0.0), |c| (c.warm_s * facing.slowness, c.cold_s * facing.start_slowness))
+        // what traces more slowly than it did is thought to start more slowly, before that is measured
+        let start_slowness = facing.start_slowness.max(facing.slowness);
+        costs.map_or((1.0, 0.0), |c| (c.warm_s * facing.slowness, c.cold_s * start_slowness))
     }
 
     pub(super) fn fits(&self, device: usize, job: &Job) -> bool {

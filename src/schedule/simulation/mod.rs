@@ -4,6 +4,8 @@ mod bound;
 mod queues;
 mod random;
 mod rule;
+#[cfg(test)]
+mod tests;
 mod trace;
 mod world;
 
@@ -108,6 +110,8 @@ pub struct Outcome {
     pub missed: f64,
     /// Runs given out.
     pub leases: f64,
+    /// Decisions: times that an idle device asked, in vain too.
+    pub decisions: f64,
     /// Jobs that never ended, and frames traced beyond those that there are.
     pub wrong: f64,
 }
@@ -137,6 +141,7 @@ pub fn simulate(trace: &Trace, contender: Contender) -> Outcome {
         over_budget: happened.over_budget as f64,
         missed: missed.count() as f64 / wanted.max(1) as f64,
         leases: happened.leases as f64,
+        decisions: happened.asked as f64,
         wrong: happened.twice as f64 + happened.ends_s.iter().filter(|e| e.is_infinite()).count() as f64,
         latency_s: mean_and_tail(latency),
         slowdown: mean_and_tail(slowdown),

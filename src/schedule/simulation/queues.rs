@@ -208,13 +208,6 @@ impl Rule for LocalQueues {
         {
             self.move_half(victim, device);
         }
-        if self.balance == Balance::Donate
-            && self.queues[device].iter().map(|(_, frames)| frames.end - frames.start).sum::<u64>() > 1
-            && let Some(idle) = (0..self.queues.len())
-                .find(|&d| d != device && self.is_idle[d] && self.is_present[d] && self.queues[d].is_empty())
-        {
-            self.move_half(device, idle);
-        }
         self.is_idle[device] = self.queues[device].is_empty();
         let left_s = |(job, frames): &(usize, Range<u64>)| {
             self.cold_s(device, *job) + self.seconds(device, *job, frames)
@@ -234,6 +227,13 @@ impl Rule for LocalQueues {
         self.loads_s[device] = (self.loads_s[device] - self.seen.warm_s(device, job)).max(0.0);
         if self.queues[device].is_empty() {
             self.loads_s[device] = 0.0;
+        }
+        let is_free = |&d: &usize| d != device && self.is_idle[d] && self.is_present[d];
+        if self.balance == Balance::Donate
+            && let Some(idle) = (0..self.queues.len()).find(is_free)
+            && self.move_half(device, idle)
+        {
+            self.is_idle[idle] = false;
         }
         Some((job, first..first + 1))
     }

@@ -21,6 +21,8 @@ pub(super) struct Happened {
     pub(super) evictions: u64,
     pub(super) over_budget: u64,
     pub(super) leases: u64,
+    /// Times that a device asked, in vain too.
+    pub(super) asked: u64,
     /// Frames beyond those that a job has.
     pub(super) twice: u64,
 }
@@ -143,6 +145,7 @@ impl World<'_> {
                 if !self.places[device].is_present {
                     continue;
                 }
+                self.happened.asked += 1;
                 match self.rule.next(now_s, device) {
                     Some((job, frames)) => {
                         has_started = true;
