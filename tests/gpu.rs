@@ -18,8 +18,9 @@ use rentix::format::{ReadOptions, TextureCache, load_obj};
 use rentix::job::{Options, Request, resolve};
 use rentix::math::{DVec3, Vec3};
 use rentix::plan::{Action, Residency, Update, UpdatePlan, Wishes, plan_frame};
-use rentix::run::{RunOptions, render};
+use rentix::run::{Fleet, RunOptions, render};
 use rentix::scene::{AovSet, Background, Camera, Filter, Frame, Material, Object, Shot};
+use rentix::schedule::Policy;
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::Arc;
@@ -383,7 +384,9 @@ fn pictures_of_run(input: &Path, out: &Path, device: Box<dyn Device>) -> BTreeMa
     })
     .unwrap();
     let options = RunOptions { threads: 2, keeps_reports: true, ..RunOptions::default() };
-    let outcome = render(&job, &options, &mut [device], &Stop::default(), &mut |_| {}).unwrap();
+    let outcome =
+        render(&job, &options, &Fleet::new(vec![device], Policy::default()), &Stop::default(), &mut |_| {})
+            .unwrap();
     let failed: Vec<_> = outcome.failed().map(|f| &f.error).collect();
     assert!(failed.is_empty(), "{failed:?}");
     let entries = std::fs::read_dir(out).unwrap().map(|e| e.unwrap().path());

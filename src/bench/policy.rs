@@ -87,7 +87,13 @@ fn render(bench: &Bench, input: &Input, update: Update) -> Result<Vec<FrameRepor
         keeps_reports: true,
         ..RunOptions::default()
     };
-    let outcome = run::render(&job, &options, &mut [Box::new(device)], &Stop::default(), &mut |_| {})?;
+    let outcome = run::render(
+        &job,
+        &options,
+        &run::Fleet::new(vec![Box::new(device)], crate::schedule::Policy::default()),
+        &Stop::default(),
+        &mut |_| {},
+    )?;
     Ok(outcome.report.frames)
 }
 

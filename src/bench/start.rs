@@ -39,7 +39,13 @@ fn start_ms(bench: &Bench, file: &Path, view: &View, store: Option<Arc<Store>>) 
         CpuDevice::new(threads, u64::MAX).map_err(|_| BenchError::NoThreads)?.with_store(store.clone());
     let options =
         RunOptions { threads, overwrite: true, keeps_reports: true, store, ..RunOptions::default() };
-    let outcome = run::render(&job, &options, &mut [Box::new(device)], &Stop::default(), &mut |_| {})?;
+    let outcome = run::render(
+        &job,
+        &options,
+        &run::Fleet::new(vec![Box::new(device)], crate::schedule::Policy::default()),
+        &Stop::default(),
+        &mut |_| {},
+    )?;
     let ms = outcome.report.frames.first().map(|f| f.ms).unwrap_or_default();
     Ok([ms.read, ms.parse, ms.diff, ms.upload, ms.update].into_iter().flatten().sum())
 }

@@ -4,9 +4,9 @@ use super::progress::{Progress, ProgressKind};
 use super::render_args::RenderArgs;
 use super::store::store;
 use super::{EXIT_FAILED, EXIT_NO_DEVICE, Global, request, stop};
-use crate::device::{Device, registry};
+use crate::device::registry;
 use crate::job::{self, FrameSet, Job};
-use crate::run::{self, Event, FrameReport, Outcome, RunOptions, machine};
+use crate::run::{self, Event, Fleet, FrameReport, Outcome, RunOptions, machine};
 use crate::store::Store;
 use anyhow::Result;
 use std::fmt::Write as _;
@@ -17,7 +17,7 @@ use std::sync::Arc;
 pub(super) fn render(args: &RenderArgs, global: &Global) -> Result<ExitCode> {
     let job = job::resolve(&request::request(args)?)?;
     let options = run_options(args);
-    let mut devices = devices(args, &options)?;
+    let fleet = fleet(args, &options)?;
     if args.dry_run {
         dry_run(&job, global);
         return Ok(ExitCode::SUCCESS);
@@ -27,7 +27,7 @@ pub(super) fn render(args: &RenderArgs, global: &Global) -> Result<ExitCode> {
     let kind = if json || global.quiet && for_people { ProgressKind::None } else { args.progress };
     let mut progress = Progress::new(kind, global.verbose);
     let stop = stop::on_signals()?;
-    let outcome = run::render(&job, &options, &mut devices, &stop.asked, &mut |event| {
+    let outcome = run::render(&job, &options, &fleet, &stop.asked, &mut |event| {
         if json {
             println!("{}", event_json(event));
         } else if !(global.quiet && matches!(event, Event::Warning(_))) {
@@ -48,7 +48,7 @@ pub(super) fn run_options(args: &RenderArgs) -> RunOptions {
         memory_bytes: Some(args.memory.unwrap_or_else(machine::default_budget_bytes)),
         cold: args.cold,
         update: args.update.into(),
-        policy: args.schedule.into(),
+        priority: 0,
         overwrite: args.overwrite,
         lenient: args.lenient,
         strict: args.strict,
@@ -64,14 +64,14 @@ fn store_of(args: &RenderArgs) -> Option<Arc<Store>> {
 }
 
 /// The devices asked for.
-pub(super) fn devices(args: &RenderArgs, options: &RunOptions) -> Result<Vec<Box<dyn Device>>> {
+pub(super) fn fleet(args: &RenderArgs, options: &RunOptions) -> Result<Fleet> {
     let wanted = registry::Wanted {
         threads: threads(args),
         budget_bytes: args.device_memory,
         host_budget_bytes: machine::default_budget_bytes(),
         store: options.store.clone(),
     };
-    Ok(registry::open_all(args.device.as_deref(), &wanted)?)
+    Ok(Fleet::new(registry::open_all(args.device.as_deref(), &wanted)?, args.schedule.into()))
 }
 
 fn threads(args: &RenderArgs) -> usize {

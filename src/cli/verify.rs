@@ -1,7 +1,7 @@
 //! `rentix verify`.
 
 use super::progress::{Progress, ProgressKind};
-use super::render::{devices, run_options};
+use super::render::{fleet, run_options};
 use super::render_args::RenderArgs;
 use super::{EXIT_FAILED, Global, request, stop};
 use crate::job;
@@ -20,7 +20,7 @@ pub(super) fn verify(args: &RenderArgs, global: &Global) -> Result<ExitCode> {
     let kind = if global.quiet || global.json { ProgressKind::None } else { args.progress };
     let mut progress = Progress::new(kind, global.verbose);
     let (verdict, outcome) =
-        verify_job(&job, &options, || devices(args, &options), &stop.asked, &mut |way, event| {
+        verify_job(&job, &options, || fleet(args, &options), &stop.asked, &mut |way, event| {
             if !(global.quiet || global.json) {
                 if matches!(event, Event::Start { .. }) {
                     progress.line(&format!("{}:", way.name));

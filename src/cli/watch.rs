@@ -1,7 +1,7 @@
 //! `rentix watch`.
 
 use super::progress::ProgressKind;
-use super::render::{devices, end_json, event_json, run_options};
+use super::render::{end_json, event_json, fleet, run_options};
 use super::render_args::RenderArgs;
 use super::{EXIT_FAILED, Global, request, stop};
 use crate::job::Request;
@@ -78,7 +78,7 @@ pub(super) fn watch(args: &WatchArgs, global: &Global) -> Result<ExitCode> {
         bail!("--settle: {settle_s} is out of range: allowed from 0 to {SETTLE_MAX_S}");
     }
     let run = run_options(render);
-    let devices = devices(render, &run)?;
+    let fleet = fleet(render, &run)?;
     let smtp = args.smtp.clone().or_else(|| std::env::var("RENTIX_SMTP").ok().filter(|url| !url.is_empty()));
     let options = WatchOptions {
         inbox: inbox.clone(),
@@ -97,7 +97,7 @@ pub(super) fn watch(args: &WatchArgs, global: &Global) -> Result<ExitCode> {
             smtp,
         },
     };
-    let ended = watch::watch(&options, devices, &stop.asked, &mut |event| {
+    let ended = watch::watch(&options, fleet, &stop.asked, &mut |event| {
         if global.json {
             println!("{}", as_json(event));
         } else {

@@ -7,6 +7,7 @@ mod check;
 mod costs;
 mod estimate;
 pub mod event;
+mod fleet;
 pub mod machine;
 mod memory;
 mod prepare;
@@ -19,17 +20,18 @@ pub mod verify;
 mod write;
 
 pub use event::{Event, FrameReport, Status};
+pub use fleet::Fleet;
 pub use read::read_frame;
 pub use report::{DeviceReport, Report, Totals};
 pub use source::Sources;
 
 use crate::clock::Stopwatch;
-use crate::device::{Device, DeviceKind, Stop};
+use crate::device::{DeviceKind, Stop};
 use crate::film::LatentFilm;
 use crate::job::Job;
 use crate::output::{self, OutputError, Records, RunLog};
 use crate::plan::Update;
-use crate::schedule::{DeviceFacts, Policy, ScheduleError};
+use crate::schedule::ScheduleError;
 use crate::store::Store;
 use crate::warning::Warnings;
 use read::ReadFrame;
@@ -71,8 +73,8 @@ pub struct RunOptions {
     pub lenient: bool,
     /// What is missing fails its frame.
     pub strict: bool,
-    /// How frames are shared out over several devices.
-    pub policy: Policy,
+    /// Its share beside other runs on the same devices: each step doubles it.
+    pub priority: i32,
     /// Where the report goes.
     pub report: Option<PathBuf>,
     /// Whether the outcome has the reports of all frames, as it has where a report goes somewhere; else only of those that
@@ -143,11 +145,11 @@ struct Shown {
     status: Status,
 }
 
-/// Renders a job on devices. `on_event` is called on this thread.
+/// Renders a job on devices that other runs may share. `on_event` is called on this thread.
 pub fn render(
     job: &Job,
     options: &RunOptions,
-    devices: &mut [Box<dyn Device>],
+    fleet: &Fleet,
     stop: &Stop,
     on_event: &mut dyn FnMut(&Event),
 ) -> Result<Outcome, RunError> {
@@ -156,14 +158,11 @@ pub fn render(
     check::nothing_is_lost(job, &records, options)?;
     clean_up(job);
     let mut warnings = Warnings::default();
-    let mut report = Report::new(
-        devices.iter().map(|device| DeviceReport::new(device.info())).collect(),
-        options.keeps_reports || options.report.is_some(),
-    );
+    let mut report = Report::new(fleet.reports(), options.keeps_reports || options.report.is_some());
     on_event(&Event::Start {
         frames: job.pictures.len(),
         folder: job.folder.display().to_string(),
-        devices: devices.iter().map(|device| device.info().name.clone()).collect(),
+        devices: fleet.devices().iter().map(|device| device.info.name.clone()).collect(),
     });
     tell(&job.warnings, &mut warnings, &mut report, on_event);
     let prepared = prepare::prepare(job, options);
@@ -171,14 +170,18 @@ pub fn render(
 
     let reader = read::Reader::new(job, options, &records, prepared);
     let log = RunLog::create(&job.folder);
-    let threads =
-        devices.iter().map(|device| stage_threads(options.threads, device.info().kind)).max().unwrap_or(1);
-    let share = shared(job, options, devices, threads)?;
+    let threads = fleet
+        .devices()
+        .iter()
+        .map(|device| stage_threads(options.threads, device.info.kind))
+        .max()
+        .unwrap_or(1);
+    let share = shared(job, options, fleet, threads)?;
     let mut saved = report::Saver::new(options.report.clone());
 
     std::thread::scope(|scope| {
         let (note, notes) = channel::<Note>();
-        let (to_devices, from_readers): (Vec<_>, Vec<_>) = devices.iter().map(|_| channel()).unzip();
+        let (to_devices, from_readers): (Vec<_>, Vec<_>) = fleet.devices().iter().map(|_| channel()).unzip();
         // no queue between device and writers: a film waits in the device stage until a writer is free
         let (to_writers, from_device) = sync_channel::<Shown>(0);
         let from_device = Arc::new(Mutex::new(from_device));
@@ -188,11 +191,11 @@ pub fn render(
             scope.spawn(move || read::read_stage(reader, share, stop, &to_devices, &note));
         }
         drop(to_devices);
-        for (place, (device, from_readers)) in devices.iter_mut().zip(from_readers).enumerate() {
+        for (place, (device, from_readers)) in fleet.devices().iter().zip(from_readers).enumerate() {
             let (note, to_writers, share) = (note.clone(), to_writers.clone(), &share);
             scope.spawn(move || {
                 let ends = Ends { device: place, share, stop, to_writers: &to_writers, note: &note };
-                trace::device_stage(&mut **device, options, &from_readers, ends);
+                trace::device_stage(device, options, &from_readers, ends);
             });
         }
         drop(to_writers);
@@ -237,22 +240,17 @@ pub fn render(
 }
 
 /// The frames of a job, shared out over devices of which each has as many read ahead as there are readers for it.
-fn shared(
+fn shared<'a>(
     job: &Job,
     options: &RunOptions,
-    devices: &[Box<dyn Device>],
+    fleet: &'a Fleet,
     readers: usize,
-) -> Result<Share, RunError> {
-    let budget_bytes = |device: &dyn Device| device.info().budget_bytes;
-    // what two devices take for a frame is never quite the same
-    let facts = |(kind, device): (usize, &Box<dyn Device>)| {
-        let facts = DeviceFacts { budget_bytes: budget_bytes(&**device), kind };
-        (facts, estimate::estimate(job, device.info()))
-    };
-    let all: Vec<_> = devices.iter().enumerate().map(facts).collect();
+) -> Result<Share<'a>, RunError> {
+    let devices = fleet.devices();
+    let costs = devices.iter().map(|device| estimate::estimate(job, &device.info)).collect();
     let ahead = (readers.div_ceil(devices.len().max(1)) + FRAMES_READ_AHEAD).max(3);
     let memory_bytes = options.memory_bytes.unwrap_or(u64::MAX);
-    Ok(Share::new(options.policy, job.pictures.len(), &all, ahead, memory_bytes)?)
+    Ok(Share::new(&fleet.hub, job.pictures.len(), options.priority, costs, ahead, memory_bytes)?)
 }
 
 /// What a caught panic says, for the error of its frame.

@@ -1,11 +1,10 @@
-//! What readers read next and for which device, as the scheduler leases it; and what frames on their way may take of the
-//! host's memory: a bound on their number for each device, and one on their bytes.
+//! What readers read next and for which device, as the scheduler leases it to one of the runs that share the devices; and what
+//! frames on their way may take of the host's memory: a bound on their number for each device, and one on their bytes.
 
 use crate::clock::Stopwatch;
 use crate::device::Stop;
 use crate::schedule::{Costs, DeviceFacts, JobId, Lease, NewJob, Policy, ScheduleError, Scheduler};
-use std::collections::HashMap;
-use std::ops::Range;
+use std::collections::{BTreeMap, HashMap};
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 
 /// On so many devices a frame is tried.
@@ -18,17 +17,14 @@ pub(super) struct Turn {
     pub(super) device: usize,
     /// The place of its picture in the job.
     pub(super) index: usize,
-    /// Its place among all that are read for that device, which takes them in that order.
+    /// Its place among all of its run that are read for that device, which takes them in that order.
     pub(super) turn: u64,
 }
 
-/// The frames of a run, shared out.
+/// The frames of all runs, shared out.
 #[derive(Debug)]
-pub(super) struct Share {
+pub(super) struct Hub {
     clock: Stopwatch,
-    /// Frames that are read ahead for each device.
-    ahead: u64,
-    budget_bytes: u64,
     state: Mutex<State>,
     changed: Condvar,
 }
@@ -36,20 +32,17 @@ pub(super) struct Share {
 #[derive(Debug)]
 struct State {
     scheduler: Scheduler,
-    job: JobId,
     feeds: Vec<Feed>,
+    runs: BTreeMap<JobId, Run>,
+    /// What frames on their way take.
     bytes: u64,
-    /// Frames that are neither traced nor given up.
-    left: u64,
-    /// Frames that failed, and the devices they failed on.
-    failed: HashMap<usize, Vec<usize>>,
 }
 
 /// What is read for a device.
 #[derive(Clone, Debug, Default)]
 struct Feed {
     /// What is leased to it and not given to a reader yet.
-    leased: Range<u64>,
+    lease: Option<Lease>,
     /// Frames that readers took for it.
     given: u64,
     /// Those that it took of them.
@@ -59,144 +52,24 @@ struct Feed {
     is_gone: bool,
 }
 
-impl Share {
-    /// For so many frames and devices with their budgets and costs.
-    ///
-    /// # Errors
-    /// Where no device can hold the frames.
-    pub(super) fn new(
-        policy: Policy,
-        frames: usize,
-        devices: &[(DeviceFacts, Costs)],
-        ahead: usize,
-        budget_bytes: u64,
-    ) -> Result<Self, ScheduleError> {
-        let facts: Vec<DeviceFacts> = devices.iter().map(|d| d.0).collect();
-        let mut scheduler = Scheduler::new(policy, &facts);
-        let frames = frames as u64;
-        let costs = devices.iter().map(|d| d.1).collect();
-        let job = scheduler.add(0.0, &NewJob { frames, grows: false, priority: 0, costs, bytes: 0 })?;
-        let state = State {
-            scheduler,
-            job,
-            feeds: vec![Feed::default(); devices.len()],
-            bytes: 0,
-            left: frames,
-            failed: HashMap::new(),
-        };
-        let (state, changed) = (Mutex::new(state), Condvar::new());
-        Ok(Self { clock: Stopwatch::start(), ahead: ahead as u64, budget_bytes, state, changed })
-    }
+/// One of the runs.
+#[derive(Debug)]
+struct Run {
+    /// For each device the frames that its readers took, and those of them that the device took.
+    turns: Vec<[u64; 2]>,
+    /// Frames that are neither traced nor given up.
+    left: u64,
+    /// Frames that failed, and the devices they failed on.
+    failed: HashMap<usize, Vec<usize>>,
+}
 
-    /// What a reader reads next; waits while every device has enough ahead of it. None at the end.
-    pub(super) fn next(&self, stop: &Stop) -> Option<Turn> {
-        let mut state = self.lock();
-        loop {
-            if stop.asked() || state.scheduler.is_done(state.job) {
-                break;
-            }
-            if let Some(turn) = state.next(self.clock.s(), self.ahead) {
-                return Some(turn);
-            }
-            if state.feeds.iter().all(|feed| feed.given == feed.left && feed.leased.is_empty()) {
-                // nothing is on its way that could change anything
-                break;
-            }
-            state = self.changed.wait(state).unwrap_or_else(PoisonError::into_inner);
-        }
-        drop(state);
-        // the other readers must come to this point too
-        self.changed.notify_all();
-        None
-    }
-
-    /// Waits until so many bytes are free and takes them. The frame that its device waits for is not held up: those before
-    /// it are done, and those behind it wait for it.
-    pub(super) fn take_bytes(&self, turn: Turn, bytes: u64) {
-        let is_held_up = |s: &mut State| {
-            s.feeds[turn.device].taken < turn.turn && s.bytes.saturating_add(bytes) > self.budget_bytes
-        };
-        let mut state =
-            self.changed.wait_while(self.lock(), is_held_up).unwrap_or_else(PoisonError::into_inner);
-        state.bytes += bytes;
-    }
-
-    /// A frame has left its device's stage.
-    pub(super) fn give_bytes(&self, bytes: u64) {
-        self.change(|s| s.bytes -= bytes);
-    }
-
-    /// A device takes the next frame that was read for it.
-    pub(super) fn taken(&self, device: usize) {
-        self.change(|s| s.feeds[device].taken += 1);
-    }
-
-    /// A frame is traced, in so many seconds of its device; or ended where it was read, in none.
-    pub(super) fn done(&self, device: usize, index: usize, seconds: f64) {
-        self.change(|s| {
-            s.feeds[device].left += 1;
-            if s.scheduler.done(device, s.job, index as u64, seconds) {
-                s.left -= 1;
-            }
-        });
-    }
-
-    /// A device made the scene resident, in so many seconds.
-    pub(super) fn started(&self, device: usize, seconds: f64) {
-        let now_s = self.clock.s();
-        self.change(|s| {
-            s.scheduler.learn(now_s, device, s.job, None, Some(seconds));
-            s.scheduler.holds(device, s.job, true);
-        });
-    }
-
-    /// A frame failed on a device: whether another one tries it.
-    pub(super) fn failed(&self, device: usize, index: usize) -> bool {
-        let now_s = self.clock.s();
-        self.change(|s| {
-            s.feeds[device].left += 1;
-            let tried = s.failed.entry(index).or_default();
-            tried.push(device);
-            let is_other = |(d, feed): (usize, &Feed)| !feed.is_gone && !tried.contains(&d);
-            let has_other = tried.len() < TRIES && s.feeds.iter().enumerate().any(is_other);
-            let frame = index as u64;
-            s.scheduler.give_back(now_s, device, s.job, frame..frame + 1, true);
-            if !has_other {
-                s.scheduler.give_up(s.job, frame);
-                s.left -= 1;
-            }
-            has_other
-        })
-    }
-
-    /// A frame comes back untraced.
-    pub(super) fn gave_back(&self, device: usize, index: usize) {
-        let now_s = self.clock.s();
-        self.change(|s| {
-            s.feeds[device].left += 1;
-            let frame = index as u64;
-            s.scheduler.give_back(now_s, device, s.job, frame..frame + 1, false);
-        });
-    }
-
-    /// A device will take no more frames. False where it is the last one: then it must.
-    pub(super) fn gone(&self, device: usize) -> bool {
-        let now_s = self.clock.s();
-        self.change(|s| {
-            if s.feeds.iter().filter(|feed| !feed.is_gone).count() <= 1 {
-                return false;
-            }
-            let feed = &mut s.feeds[device];
-            feed.is_gone = true;
-            feed.leased = 0..0;
-            s.scheduler.device_gone(now_s, device);
-            true
-        })
-    }
-
-    /// Frames that are still to come.
-    pub(super) fn left(&self) -> u64 {
-        self.lock().left
+impl Hub {
+    /// For devices with their budgets.
+    pub(super) fn new(policy: Policy, devices: &[DeviceFacts]) -> Self {
+        let feeds = vec![Feed::default(); devices.len()];
+        let scheduler = Scheduler::new(policy, devices);
+        let state = State { scheduler, feeds, runs: BTreeMap::new(), bytes: 0 };
+        Self { clock: Stopwatch::start(), state: Mutex::new(state), changed: Condvar::new() }
     }
 
     fn lock(&self) -> MutexGuard<'_, State> {
@@ -210,22 +83,203 @@ impl Share {
     }
 }
 
+/// A run's part of it, from its begin to its end.
+#[derive(Debug)]
+pub(super) struct Share<'a> {
+    hub: &'a Hub,
+    job: JobId,
+    /// Frames that are read ahead for each device.
+    ahead: u64,
+    budget_bytes: u64,
+}
+
+impl Drop for Share<'_> {
+    fn drop(&mut self) {
+        self.hub.change(|s| {
+            s.scheduler.cancel(self.job);
+            s.runs.remove(&self.job);
+            for feed in &mut s.feeds {
+                feed.lease.take_if(|lease| lease.job == self.job);
+            }
+        });
+    }
+}
+
+impl<'a> Share<'a> {
+    /// A run of so many frames, with their costs on each device.
+    ///
+    /// # Errors
+    /// Where no device can hold the frames.
+    pub(super) fn new(
+        hub: &'a Hub,
+        frames: usize,
+        priority: i32,
+        costs: Vec<Costs>,
+        ahead: usize,
+        budget_bytes: u64,
+    ) -> Result<Self, ScheduleError> {
+        let now_s = hub.clock.s();
+        let frames = frames as u64;
+        let job = hub.change(|s| {
+            let turns = vec![[0; 2]; s.feeds.len()];
+            let job = s.scheduler.add(now_s, &NewJob { frames, grows: false, priority, costs, bytes: 0 })?;
+            s.runs.insert(job, Run { turns, left: frames, failed: HashMap::new() });
+            Ok(job)
+        })?;
+        Ok(Self { hub, job, ahead: ahead as u64, budget_bytes })
+    }
+
+    /// What a reader reads next; waits while every device has enough ahead of it, or reads for other runs. None at the end.
+    pub(super) fn next(&self, stop: &Stop) -> Option<Turn> {
+        let mut state = self.hub.lock();
+        loop {
+            if stop.asked() || state.scheduler.is_done(self.job) {
+                break;
+            }
+            let turn = state.next(self.job, self.hub.clock.s(), self.ahead);
+            // a lease may be another run's
+            self.hub.changed.notify_all();
+            if turn.is_some() {
+                return turn;
+            }
+            if state.feeds.iter().all(|feed| feed.given == feed.left && feed.lease.is_none()) {
+                // nothing is on its way that could change anything
+                break;
+            }
+            state = self.hub.changed.wait(state).unwrap_or_else(PoisonError::into_inner);
+        }
+        drop(state);
+        // the other readers must come to this point too
+        self.hub.changed.notify_all();
+        None
+    }
+
+    /// Waits until so many bytes are free and takes them. The frame that its device waits for is not held up: those before
+    /// it are done, and those behind it wait for it.
+    pub(super) fn take_bytes(&self, turn: Turn, bytes: u64) {
+        let is_held_up = |s: &mut State| {
+            let [_, taken] = s.runs[&self.job].turns[turn.device];
+            taken < turn.turn && s.bytes.saturating_add(bytes) > self.budget_bytes
+        };
+        let waited = self.hub.changed.wait_while(self.hub.lock(), is_held_up);
+        waited.unwrap_or_else(PoisonError::into_inner).bytes += bytes;
+    }
+
+    /// A frame has left its device's stage.
+    pub(super) fn give_bytes(&self, bytes: u64) {
+        self.hub.change(|s| s.bytes -= bytes);
+    }
+
+    /// A device takes the next frame that was read for it.
+    pub(super) fn taken(&self, device: usize) {
+        self.change(|s, run| {
+            s.feeds[device].taken += 1;
+            run.turns[device][1] += 1;
+        });
+    }
+
+    /// A frame is traced, in so many seconds of its device; or ended where it was read, in none.
+    pub(super) fn done(&self, device: usize, index: usize, seconds: f64) {
+        self.change(|s, run| {
+            s.feeds[device].left += 1;
+            if s.scheduler.done(device, self.job, index as u64, seconds) {
+                run.left -= 1;
+            }
+        });
+    }
+
+    /// A device made the scene resident, in so many seconds.
+    pub(super) fn started(&self, device: usize, seconds: f64) {
+        let now_s = self.hub.clock.s();
+        self.change(|s, _| {
+            s.scheduler.learn(now_s, device, self.job, None, Some(seconds));
+            s.scheduler.holds(device, self.job, true);
+        });
+    }
+
+    /// A frame failed on a device: whether another one tries it.
+    pub(super) fn failed(&self, device: usize, index: usize) -> bool {
+        let now_s = self.hub.clock.s();
+        self.change(|s, run| {
+            s.feeds[device].left += 1;
+            let tried = run.failed.entry(index).or_default();
+            tried.push(device);
+            let is_other = |(d, feed): (usize, &Feed)| !feed.is_gone && !tried.contains(&d);
+            let has_other = tried.len() < TRIES && s.feeds.iter().enumerate().any(is_other);
+            let frame = index as u64;
+            s.scheduler.give_back(now_s, device, self.job, frame..frame + 1, true);
+            if !has_other {
+                s.scheduler.give_up(self.job, frame);
+                run.left -= 1;
+            }
+            has_other
+        })
+    }
+
+    /// A frame comes back untraced.
+    pub(super) fn gave_back(&self, device: usize, index: usize) {
+        let now_s = self.hub.clock.s();
+        self.change(|s, _| {
+            s.feeds[device].left += 1;
+            let frame = index as u64;
+            s.scheduler.give_back(now_s, device, self.job, frame..frame + 1, false);
+        });
+    }
+
+    /// A device will take no more frames. False where it is the last one: then it must.
+    pub(super) fn gone(&self, device: usize) -> bool {
+        let now_s = self.hub.clock.s();
+        self.change(|s, _| {
+            if s.feeds.iter().filter(|feed| !feed.is_gone).count() <= 1 {
+                return false;
+            }
+            let feed = &mut s.feeds[device];
+            feed.is_gone = true;
+            feed.lease = None;
+            s.scheduler.device_gone(now_s, device);
+            true
+        })
+    }
+
+    /// Whether a device takes no frames any more.
+    pub(super) fn is_gone(&self, device: usize) -> bool {
+        self.hub.lock().feeds[device].is_gone
+    }
+
+    /// Frames that are still to come.
+    pub(super) fn left(&self) -> u64 {
+        self.hub.lock().runs[&self.job].left
+    }
+
+    fn change<T>(&self, change: impl FnOnce(&mut State, &mut Run) -> T) -> T {
+        self.hub.change(|s| {
+            // it is there until the share is dropped
+            let mut run = s.runs.remove(&self.job).expect("the run has not ended");
+            let out = change(s, &mut run);
+            s.runs.insert(self.job, run);
+            out
+        })
+    }
+}
+
 impl State {
-    /// The next frame for the device that has the fewest ahead of it.
-    fn next(&mut self, now_s: f64, ahead: u64) -> Option<Turn> {
+    /// The next frame of a run, for the device that has the fewest ahead of it.
+    fn next(&mut self, job: JobId, now_s: f64, ahead: u64) -> Option<Turn> {
         let mut hungry: Vec<usize> = (0..self.feeds.len()).collect();
         hungry.retain(|&d| !self.feeds[d].is_gone && self.feeds[d].given - self.feeds[d].taken < ahead);
         hungry.sort_by_key(|&d| self.feeds[d].given - self.feeds[d].taken);
         for device in hungry {
-            if self.feeds[device].leased.is_empty() {
-                let lease = self.scheduler.lease(now_s, device);
-                self.feeds[device].leased = lease.map_or(0..0, |Lease { frames, .. }| frames);
+            if self.feeds[device].lease.is_none() {
+                self.feeds[device].lease = self.scheduler.lease(now_s, device);
             }
             let feed = &mut self.feeds[device];
-            if let Some(frame) = feed.leased.next() {
-                feed.given += 1;
-                return Some(Turn { device, index: frame as usize, turn: feed.given - 1 });
-            }
+            let Some(lease) = feed.lease.as_mut().filter(|lease| lease.job == job) else { continue };
+            let Some(frame) = lease.frames.next() else { continue };
+            feed.lease.take_if(|lease| lease.frames.is_empty());
+            feed.given += 1;
+            let [given, _] = &mut self.runs.get_mut(&job)?.turns[device];
+            *given += 1;
+            return Some(Turn { device, index: frame as usize, turn: *given - 1 });
         }
         None
     }
@@ -237,18 +291,20 @@ mod tests {
 
     const COSTS: Costs = Costs { warm_s: 0.01, cold_s: 0.0, fits: true };
 
-    fn share(frames: usize, devices: usize, ahead: usize, budget_bytes: u64) -> Share {
-        let facts = DeviceFacts { budget_bytes: 1 << 30, kind: 0 };
-        let mut all = vec![(facts, COSTS); devices];
-        for (kind, (facts, _)) in all.iter_mut().enumerate() {
-            facts.kind = kind;
-        }
-        Share::new(Policy::Affinity, frames, &all, ahead, budget_bytes).unwrap()
+    fn hub(devices: usize) -> Hub {
+        let facts = |kind| DeviceFacts { budget_bytes: 1 << 30, kind };
+        Hub::new(Policy::Affinity, &(0..devices).map(facts).collect::<Vec<_>>())
+    }
+
+    fn share(hub: &Hub, frames: usize, ahead: usize, budget_bytes: u64) -> Share<'_> {
+        let costs = vec![COSTS; hub.lock().feeds.len()];
+        Share::new(hub, frames, 0, costs, ahead, budget_bytes).unwrap()
     }
 
     #[test]
     fn every_frame_is_given_once_and_in_order_on_each_device() {
-        let (share, stop) = (share(100, 2, 3, u64::MAX), Stop::default());
+        let (hub, stop) = (hub(2), Stop::default());
+        let share = share(&hub, 100, 3, u64::MAX);
         let (mut seen, mut turns) = (vec![0; 100], [0; 2]);
         while let Some(turn) = share.next(&stop) {
             assert_eq!(turn.turn, turns[turn.device]);
@@ -263,7 +319,8 @@ mod tests {
 
     #[test]
     fn a_frame_that_fails_goes_to_another_device_and_fails_on_two() {
-        let (share, stop) = (share(1, 3, 3, u64::MAX), Stop::default());
+        let (hub, stop) = (hub(3), Stop::default());
+        let share = share(&hub, 1, 3, u64::MAX);
         let first = share.next(&stop).unwrap();
         share.taken(first.device);
         assert!(share.failed(first.device, 0), "another one tries it");
@@ -276,7 +333,8 @@ mod tests {
 
     #[test]
     fn what_a_device_that_is_gone_had_goes_to_the_other() {
-        let (share, stop) = (share(10, 2, 2, u64::MAX), Stop::default());
+        let (hub, stop) = (hub(2), Stop::default());
+        let share = share(&hub, 10, 2, u64::MAX);
         let first = share.next(&stop).unwrap();
         assert!(share.gone(first.device));
         share.gave_back(first.device, first.index);
@@ -293,7 +351,8 @@ mod tests {
 
     #[test]
     fn the_frame_whose_turn_it_is_is_never_held_up() {
-        let (share, stop) = (share(4, 1, 2, 100), Stop::default());
+        let (hub, stop) = (hub(1), Stop::default());
+        let share = share(&hub, 4, 2, 100);
         let first = share.next(&stop).unwrap();
         let second = share.next(&stop).unwrap();
         // the second came first, the first does not fit beside it, and goes on all the same
@@ -309,6 +368,36 @@ mod tests {
             share.give_bytes(90);
             waits.join().unwrap();
         });
-        assert_eq!(share.lock().bytes, 20);
+        assert_eq!(hub.lock().bytes, 20);
+    }
+
+    #[test]
+    fn runs_take_turns_and_one_that_ends_leaves_nothing_behind() {
+        let (hub, stop) = (hub(1), Stop::default());
+        let long = share(&hub, 1000, 3, u64::MAX);
+        let first = long.next(&stop).unwrap();
+        long.taken(0);
+        long.done(0, first.index, 0.01);
+        let short = share(&hub, 5, 3, u64::MAX);
+        // what the device has leased is the long one's; then the short one has its turn
+        let mut before = 0;
+        let mut done = 0;
+        while done < 5 {
+            let next = hub.lock().next(short.job, hub.clock.s(), 3);
+            if let Some(turn) = next {
+                short.taken(0);
+                short.done(0, turn.index, 0.01);
+                done += 1;
+                continue;
+            }
+            let turn = long.next(&stop).unwrap();
+            long.taken(0);
+            long.done(0, turn.index, 0.01);
+            before += 1;
+        }
+        assert!(before < 100, "{before} frames of the long run went first");
+        drop(long);
+        assert_eq!(short.next(&stop), None);
+        assert!(hub.lock().feeds[0].lease.is_none() && hub.lock().runs.len() == 1);
     }
 }

@@ -1,8 +1,10 @@
 //! The run around the fake device: faults fail their own frame, each picture shows its own frame.
 
 use super::*;
+use crate::device::Device;
 use crate::device::fake::{FakeDevice, Fault};
 use crate::job::{Request, resolve};
+use crate::schedule::Policy;
 use crate::warning::Warnings;
 use std::path::Path;
 
@@ -27,11 +29,11 @@ fn statuses(outcome: &Outcome) -> Vec<(Option<i64>, Status)> {
 }
 
 fn run(request: &Request, faults: &[(usize, Fault)], options: &RunOptions) -> Outcome {
-    run_on(request, &[faults], options)
+    run_on(request, &[faults], Policy::default(), options)
 }
 
 /// A run on fake devices of which each has faults of its own, by pictures.
-fn run_on(request: &Request, devices: &[&[(usize, Fault)]], options: &RunOptions) -> Outcome {
+fn run_on(request: &Request, devices: &[&[(usize, Fault)]], policy: Policy, options: &RunOptions) -> Outcome {
     let job = resolve(request).unwrap();
     let frame = |picture: usize| {
         let (sources, warnings) = (source::Sources::default(), &mut Warnings::default());
@@ -44,8 +46,8 @@ fn run_on(request: &Request, devices: &[&[(usize, Fault)]], options: &RunOptions
         };
         Box::new(faults.iter().fold(device, with)) as Box<dyn Device>
     };
-    let mut devices: Vec<_> = devices.iter().enumerate().map(fake).collect();
-    render(&job, options, &mut devices, &Stop::default(), &mut |_| {}).unwrap()
+    let devices: Vec<_> = devices.iter().enumerate().map(fake).collect();
+    render(&job, options, &Fleet::new(devices, policy), &Stop::default(), &mut |_| {}).unwrap()
 }
 
 fn two_threads() -> RunOptions {
@@ -111,7 +113,9 @@ fn a_run_that_is_told_to_stop_before_it_begins_makes_nothing() {
     let stop = Stop::default();
     stop.ask();
     let device = Box::new(FakeDevice::new("fake", 1 << 20));
-    let outcome = render(&job, &two_threads(), &mut [device], &stop, &mut |_| {}).unwrap();
+    let outcome =
+        render(&job, &two_threads(), &Fleet::new(vec![device], Policy::default()), &stop, &mut |_| {})
+            .unwrap();
     assert!(outcome.stopped && outcome.report.frames.is_empty() && !t.path().join("out").exists());
 }
 
@@ -145,7 +149,14 @@ fn a_picture_that_is_gone_at_the_end_is_told_of_with_and_without_a_report() {
                 }
             };
             let device = Box::new(FakeDevice::new("fake", 1 << 20));
-            render(&job, &options, &mut [device], &Stop::default(), &mut on_event).unwrap()
+            render(
+                &job,
+                &options,
+                &Fleet::new(vec![device], Policy::default()),
+                &Stop::default(),
+                &mut on_event,
+            )
+            .unwrap()
         };
         assert_eq!(told.last(), Some(&(Some(2), Status::Failed)));
         let failed: Vec<_> = outcome.failed().collect();
@@ -165,7 +176,7 @@ fn several_devices_make_what_one_makes() {
     for policy in [Policy::Affinity, Policy::Fifo] {
         let folder = t.path().join(format!("{policy:?}"));
         request.folder = Some(folder.clone());
-        let outcome = run_on(&request, &[&[], &[], &[]], &RunOptions { policy, ..two_threads() });
+        let outcome = run_on(&request, &[&[], &[], &[]], policy, &two_threads());
         assert_eq!(pictures(&folder), first);
         let traced: u64 = outcome.report.devices.iter().map(|d| d.frames).sum();
         assert_eq!(traced, FRAMES as u64);
@@ -181,7 +192,7 @@ fn what_fails_on_one_device_is_made_by_another() {
         &[(0, Fault::OutOfMemory), (2, Fault::OutOfMemory)],
         &[(1, Fault::OutOfMemory), (5, Fault::OutOfMemory)],
     ];
-    let outcome = run_on(&sequence(t.path()), &faults, &two_threads());
+    let outcome = run_on(&sequence(t.path()), &faults, Policy::default(), &two_threads());
     assert_eq!(outcome.report.totals.rendered, FRAMES as u64, "{:?}", statuses(&outcome));
 }
 
@@ -189,7 +200,7 @@ fn what_fails_on_one_device_is_made_by_another() {
 fn what_fails_on_two_devices_has_failed() {
     let t = tempfile::tempdir().unwrap();
     let faults: &[_] = &[(3, Fault::OutOfMemory)];
-    let outcome = run_on(&sequence(t.path()), &[faults, faults, faults], &two_threads());
+    let outcome = run_on(&sequence(t.path()), &[faults, faults, faults], Policy::default(), &two_threads());
     assert_eq!(outcome.report.totals.rendered, 5);
     let failed: Vec<_> = outcome.failed().collect();
     assert!(failed.len() == 1 && failed[0].frame == Some(4) && failed[0].device_failed);
@@ -199,7 +210,7 @@ fn what_fails_on_two_devices_has_failed() {
 fn a_device_that_stays_lost_gives_its_frames_to_another() {
     let t = tempfile::tempdir().unwrap();
     let lost: Vec<_> = (0..FRAMES).map(|picture| (picture, Fault::Lost)).collect();
-    let outcome = run_on(&sequence(t.path()), &[&lost, &[]], &two_threads());
+    let outcome = run_on(&sequence(t.path()), &[&lost, &[]], Policy::default(), &two_threads());
     assert_eq!(outcome.report.totals.rendered, FRAMES as u64, "{:?}", statuses(&outcome));
     assert!(outcome.report.frames.iter().all(|f| f.device.as_deref() == Some("fake:1")));
 }

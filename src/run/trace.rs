@@ -2,12 +2,13 @@
 
 use super::costs::Learned;
 use super::event::{Status, UpdateReport};
+use super::fleet::{Held, Shared};
 use super::read::{Read, ReadFrame};
 use super::report::DeviceReport;
 use super::share::Share;
 use super::{Note, RunOptions, Shown, panic_text};
 use crate::clock::Stopwatch;
-use crate::device::{Device, DeviceError, Output, Stop, Traced, UpdateCost};
+use crate::device::{DeviceError, Output, Stop, Traced, UpdateCost};
 use crate::diff::changes;
 use crate::film::LatentFilm;
 use crate::kernel::media::MEDIA_MAX;
@@ -17,29 +18,27 @@ use crate::warning::Warnings;
 use std::collections::{BTreeMap, VecDeque};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
-use std::sync::Arc;
 use std::sync::mpsc::{Receiver, Sender, SyncSender, TryRecvError};
+use std::sync::{Arc, MutexGuard};
 
 /// Takes frames in their order, makes each resident, traces it and hands the film to a writer. As many frames are under way
 /// as the device takes; where no other is read yet, the first of them is waited for.
 pub(super) fn device_stage(
-    device: &mut dyn Device,
+    shared: &Shared,
     options: &RunOptions,
     from_readers: &Receiver<Read>,
     ends: Ends<'_>,
 ) {
     let mut stage = DeviceStage {
-        told: DeviceReport::new(device.info()),
-        most_under_way: if options.cold { 1 } else { device.most_under_way() },
-        device,
+        told: DeviceReport::new(&shared.info),
+        shared,
+        held: None,
         under_way: VecDeque::new(),
         before: None,
         cold: options.cold,
         update: options.update,
         learned: Learned::new(),
-        forget: false,
         losses: 0,
-        is_gone: false,
         clock: Stopwatch::start(),
         ended_s: 0.0,
         warnings: Warnings::default(),
@@ -68,7 +67,7 @@ pub(super) fn device_stage(
             let Ends { share, stop, note, device, .. } = stage.ends;
             share.taken(device);
             match outcome {
-                _ if stop.asked() || stage.is_gone => {
+                _ if stop.asked() || share.is_gone(device) => {
                     share.give_bytes(bytes);
                     share.gave_back(device, turn.index);
                 }
@@ -91,7 +90,7 @@ pub(super) fn device_stage(
 pub(super) struct Ends<'a> {
     /// The device, by its place among those of the run.
     pub(super) device: usize,
-    pub(super) share: &'a Share,
+    pub(super) share: &'a Share<'a>,
     pub(super) stop: &'a Stop,
     pub(super) to_writers: &'a SyncSender<Shown>,
     pub(super) note: &'a Sender<Note>,
@@ -101,9 +100,10 @@ pub(super) struct Ends<'a> {
 const LOSSES: usize = 3;
 
 struct DeviceStage<'a> {
-    device: &'a mut dyn Device,
+    shared: &'a Shared,
+    /// The device while frames are under way; between them other runs may have it.
+    held: Option<MutexGuard<'a, Held>>,
     told: DeviceReport,
-    most_under_way: usize,
     /// Frames that were begun, the first one first.
     under_way: VecDeque<UnderWay>,
     /// What the device traced last.
@@ -111,12 +111,8 @@ struct DeviceStage<'a> {
     cold: bool,
     update: Update,
     learned: Learned,
-    /// Whether what the device holds is not to be trusted, because it panicked.
-    forget: bool,
     /// Frames in a row with which it was lost.
     losses: usize,
-    /// Whether it was given up: what is read for it goes back.
-    is_gone: bool,
     clock: Stopwatch,
     /// When it last finished a frame.
     ended_s: f64,
@@ -176,24 +172,28 @@ impl DeviceStage<'_> {
             }
         }
         self.begin(read, bytes, true);
-        while self.under_way.len() >= self.most_under_way {
+        let most =
+            if self.cold { 1 } else { self.held.as_ref().map_or(1, |held| held.device.most_under_way()) };
+        while self.under_way.len() >= most {
             self.finish_first();
         }
     }
 
     /// Makes a frame resident and begins to trace it.
     fn begin(&mut self, mut read: ReadFrame, bytes: u64, may_retry: bool) {
+        let shared = self.shared;
+        self.held.get_or_insert_with(|| shared.take());
         let busy = Stopwatch::start();
         let begun_s = self.clock.s();
         read.report.device = Some(self.told.name.clone());
         let begun = caught("tracing", || self.update_and_begin(&mut read));
         self.told.busy_s += busy.s();
-        self.told.holds(self.device);
+        self.tell_holds();
         match begun {
             Ok(cost) => {
                 let (frame, fingerprint) = (Arc::clone(&read.frame), read.fingerprint);
                 self.before = Some(Before { frame, fingerprint, film: None });
-                self.forget = false;
+                self.forget(false);
                 self.under_way.push_back(UnderWay { read, bytes, cost, begun_s });
             }
             Err(failure) => {
@@ -216,13 +216,16 @@ impl DeviceStage<'_> {
     fn finish(&mut self, may_retry: bool) {
         let Some(mut first) = self.under_way.pop_front() else { return };
         let busy = Stopwatch::start();
-        let traced = caught("tracing", || self.device.finish());
+        // it was begun, so the device is here
+        let Some(held) = &mut self.held else { return };
+        let traced = caught("tracing", || held.device.finish());
         self.told.busy_s += busy.s();
-        self.told.holds(self.device);
+        self.tell_holds();
         match traced {
             Ok(traced) => {
                 self.told.frames += 1;
                 self.losses = 0;
+                self.let_go();
                 self.learn(&mut first, &traced);
                 self.tell_share(&first);
                 let film = Arc::new(traced.film);
@@ -245,7 +248,7 @@ impl DeviceStage<'_> {
     /// The device was lost, and with it all frames that were under way: each is tried once more, one at a time.
     fn retry(&mut self, lost: VecDeque<UnderWay>) {
         self.before = None;
-        self.forget = true;
+        self.forget(true);
         for UnderWay { read, bytes, .. } in lost {
             self.begin(read, bytes, false);
             while !self.under_way.is_empty() {
@@ -256,7 +259,8 @@ impl DeviceStage<'_> {
 
     fn failed(&mut self, failure: Failure, frame: UnderWay) {
         self.before = None;
-        self.forget = true;
+        self.forget(true);
+        self.let_go();
         let UnderWay { mut read, bytes, .. } = frame;
         let Ends { device, share, .. } = self.ends;
         share.give_bytes(bytes);
@@ -267,8 +271,7 @@ impl DeviceStage<'_> {
         }
         self.losses = if failure.is_lost() { self.losses + 1 } else { 0 };
         let is_tried_again = share.failed(device, index);
-        if self.losses >= LOSSES && share.gone(device) {
-            self.is_gone = true;
+        if self.losses >= LOSSES && !share.is_gone(device) && share.gone(device) {
             let text = format!("{} was lost {LOSSES} times and is given up", self.told.name);
             self.warnings.add(None, None, text);
         }
@@ -289,6 +292,26 @@ impl DeviceStage<'_> {
         let _ = self.ends.note.send(Note::Frame(read.report));
     }
 
+    /// Whether what the device holds is to be trusted by those that have it next.
+    fn forget(&mut self, forget: bool) {
+        if let Some(held) = &mut self.held {
+            held.forget = forget;
+        }
+    }
+
+    fn tell_holds(&mut self) {
+        if let Some(held) = &self.held {
+            self.told.holds(&*held.device);
+        }
+    }
+
+    /// Lets others have the device where nothing is under way.
+    fn let_go(&mut self) {
+        if self.under_way.is_empty() {
+            self.held = None;
+        }
+    }
+
     fn shown(&mut self, film: Arc<LatentFilm>, status: Status, read: ReadFrame, bytes: u64) {
         self.ends.share.give_bytes(bytes);
         self.tell();
@@ -305,26 +328,28 @@ impl DeviceStage<'_> {
     }
 
     fn update_and_begin(&mut self, read: &mut ReadFrame) -> Result<UpdateCost, DeviceError> {
+        let Some(held) = &mut self.held else { return Err(DeviceError::Stopped) };
+        let Held { device, forget } = &mut **held;
         let report = &mut read.report;
         let clock = Stopwatch::start();
-        let cold = self.cold || self.forget;
+        let cold = self.cold || *forget;
         let before = self.before.as_ref().filter(|_| !cold).map(|before| &*before.frame);
         report.change = changes(before, &read.frame);
         report.ms.diff = Some(clock.ms());
         let wishes = Wishes {
             cold,
-            budget_bytes: self.device.info().budget_bytes,
+            budget_bytes: device.info().budget_bytes,
             used_again: if self.cold { Vec::new() } else { std::mem::take(&mut read.used_again) },
             update: self.update,
             costs: self.learned.costs(self.ends.share.left()),
         };
-        let plan = plan_frame(&read.frame, self.device.residency(), &wishes);
-        let cost = self.device.apply(&plan, &read.frame)?;
+        let plan = plan_frame(&read.frame, device.residency(), &wishes);
+        let cost = device.apply(&plan, &read.frame)?;
         report.updated(&plan, &cost);
         let exposure_stops = read.encoding.exposure_stops;
         let output =
             if read.encoding.takes_codes() { Output::Codes { exposure_stops } } else { Output::Linear };
-        self.device.begin(&read.frame, &read.shot, output, self.ends.stop)?;
+        device.begin(&read.frame, &read.shot, output, self.ends.stop)?;
         Ok(cost)
     }
 

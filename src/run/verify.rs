@@ -1,7 +1,7 @@
 //! Renders a job in ways that must not matter, and compares what comes out byte for byte.
 
-use super::{Event, Outcome, RunError, RunOptions, render};
-use crate::device::{Device, Stop};
+use super::{Event, Fleet, Outcome, RunError, RunOptions, render};
+use crate::device::Stop;
 use crate::job::{Job, Order};
 use crate::output;
 use crate::scene::Aov;
@@ -45,11 +45,11 @@ pub enum Verdict {
 /// Frames that fail must fail in every way. Gives the outcome of the first way, too.
 ///
 /// # Errors
-/// Where there is no room, a run cannot begin, or `devices` makes none.
+/// Where there is no room, a run cannot begin, or `fleet` makes none.
 pub fn verify<E: From<RunError>>(
     job: &Job,
     options: &RunOptions,
-    mut devices: impl FnMut() -> Result<Vec<Box<dyn Device>>, E>,
+    mut fleet: impl FnMut() -> Result<Fleet, E>,
     stop: &Stop,
     on_event: &mut dyn FnMut(&Way, &Event),
 ) -> Result<(Verdict, Outcome), E> {
@@ -57,7 +57,7 @@ pub fn verify<E: From<RunError>>(
     let mut run = |way: Way| -> Result<Outcome, E> {
         let job = job_of(job, way, &room.path().join(way.name));
         let options = RunOptions { cold: way.cold, report: None, overwrite: false, ..options.clone() };
-        Ok(render(&job, &options, &mut devices()?, stop, &mut |event| on_event(&way, event))?)
+        Ok(render(&job, &options, &fleet()?, stop, &mut |event| on_event(&way, event))?)
     };
     let first = run(WAYS[0])?;
     if first.stopped {

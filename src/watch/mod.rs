@@ -26,10 +26,10 @@ mod view;
 pub use notice::Notices;
 pub use state::{FrameCounts, State, Status, Times};
 
-use crate::device::{Device, Stop};
+use crate::device::Stop;
 use crate::job::Request;
 use crate::output::OutputError;
-use crate::run::{Event, Outcome, RunOptions};
+use crate::run::{Event, Fleet, Outcome, RunOptions};
 use std::io;
 use std::net::SocketAddr;
 use std::path::{Path, PathBuf};
@@ -137,9 +137,9 @@ enum Message {
 /// Watches until it is asked to stop, or with `once` until every job present has ended. `on_event` is called on this thread.
 pub fn watch(
     options: &WatchOptions,
-    devices: Vec<Box<dyn Device>>,
+    fleet: Fleet,
     stop: &Stop,
     on_event: &mut dyn FnMut(&WatchEvent<'_>),
 ) -> Result<Ended, WatchError> {
-    daemon::Daemon::open(options, devices, on_event)?.watch(stop)
+    daemon::Daemon::open(options, fleet, on_event)?.watch(stop)
 }

@@ -1,18 +1,17 @@
-//! The one place that renders: jobs in turn, on devices that stay open and warm from job to job.
-//!
-//! One thread for now; what comes in and goes out does not say so, so that a scheduler may take several jobs at a time.
+//! The one place that renders: several jobs at a time, on devices that stay open and warm from job to job. Which of them has which
+//! device when is the scheduler's choice.
 
 use super::Message;
 use super::follow_run;
 use super::job::{self, Place};
-use crate::device::{Device, Stop};
+use crate::device::Stop;
 use crate::job::{Job, Request};
-use crate::run::{self, DeviceReport, Event, Outcome, RunOptions};
+use crate::run::{self, DeviceReport, Event, Fleet, Outcome, RunOptions};
 use std::collections::HashSet;
 use std::ffi::OsString;
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::sync::Arc;
 use std::sync::mpsc::{Sender, channel};
+use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::JoinHandle;
 
 /// What is to be rendered of a job.
@@ -26,6 +25,8 @@ pub(super) struct Order {
     pub(super) only: Option<HashSet<OsString>>,
     /// Whether the sequence is followed, which says where the auto camera stands.
     pub(super) followed: bool,
+    /// Its share beside the others'.
+    pub(super) priority: i64,
     pub(super) stop: Arc<Stop>,
 }
 
@@ -40,32 +41,38 @@ pub(super) enum Told {
     Unfit(String),
 }
 
-/// Renders orders one after the other.
+/// So many jobs share the devices: a small one need not wait for the large ones before it, and each has threads of its own.
+pub(super) const JOBS_AT_ONCE: usize = 16;
+
+/// Renders orders.
 pub(super) struct Renderer {
     orders: Option<Sender<Order>>,
-    thread: Option<JoinHandle<()>>,
+    threads: Vec<JoinHandle<()>>,
     /// What the devices are.
     pub(super) devices: Vec<DeviceReport>,
 }
 
 impl Renderer {
     /// Takes the devices; what happens is told as messages.
-    pub(super) fn start(
-        mut devices: Vec<Box<dyn Device>>,
-        options: RunOptions,
-        messages: Sender<Message>,
-    ) -> Self {
+    pub(super) fn start(fleet: Fleet, options: &RunOptions, messages: &Sender<Message>) -> Self {
         let (orders, incoming) = channel::<Order>();
-        let reports = devices.iter().map(|d| DeviceReport::new(d.info())).collect();
-        let thread = std::thread::spawn(move || {
-            for order in incoming {
-                let told = one(&order, &options, &mut devices, &messages);
-                if messages.send(Message::Told(order.id, told)).is_err() {
-                    return;
+        let devices = fleet.reports();
+        let (fleet, incoming) = (Arc::new(fleet), Arc::new(Mutex::new(incoming)));
+        let thread = || {
+            let (fleet, incoming) = (Arc::clone(&fleet), Arc::clone(&incoming));
+            let (options, messages) = (options.clone(), messages.clone());
+            std::thread::spawn(move || {
+                let next = || incoming.lock().unwrap_or_else(PoisonError::into_inner).recv();
+                while let Ok(order) = next() {
+                    let told = one(&order, &options, &fleet, &messages);
+                    if messages.send(Message::Told(order.id, told)).is_err() {
+                        return;
+                    }
                 }
-            }
-        });
-        Self { orders: Some(orders), thread: Some(thread), devices: reports }
+            })
+        };
+        let threads = (0..JOBS_AT_ONCE).map(|_| thread()).collect();
+        Self { orders: Some(orders), threads, devices }
     }
 
     /// Hands over an order; false where the renderer is gone.
@@ -77,26 +84,23 @@ impl Renderer {
 impl Drop for Renderer {
     fn drop(&mut self) {
         self.orders = None;
-        if let Some(thread) = self.thread.take() {
+        for thread in self.threads.drain(..) {
             // its panics were caught
             let _ = thread.join();
         }
     }
 }
 
-fn one(
-    order: &Order,
-    options: &RunOptions,
-    devices: &mut [Box<dyn Device>],
-    messages: &Sender<Message>,
-) -> Told {
+fn one(order: &Order, options: &RunOptions, fleet: &Fleet, messages: &Sender<Message>) -> Told {
     let mut tell = |event: &Event| {
         // nobody listens any more once the daemon ends
         let _ = messages.send(Message::Told(order.id, Told::Event(Box::new(event.clone()))));
     };
     let rendered = catch_unwind(AssertUnwindSafe(|| {
         let job = prepared(order)?;
-        run::render(&job, options, devices, &order.stop, &mut tell).map_err(|e| e.to_string())
+        let priority = order.priority.clamp(i32::MIN.into(), i32::MAX.into()) as i32;
+        let options = RunOptions { priority, ..options.clone() };
+        run::render(&job, &options, fleet, &order.stop, &mut tell).map_err(|e| e.to_string())
     }));
     match rendered {
         Ok(Ok(outcome)) => Told::Ended(Box::new(outcome)),

@@ -168,7 +168,7 @@ impl Daemon<'_> {
                 return self.note(&format!("{}: cannot be read: {error}; it is waited for", path.display()));
             }
         }
-        let is_rendering = self.current == Some(id);
+        let is_rendering = self.current.contains(&id);
         if entry.settling.is_some_and(|s| s.is_settled(span, now)) && !is_rendering {
             self.accept(id, run);
         } else if entry.session.as_ref().is_some_and(|s| s.fits.is_none() && !s.ready.is_empty()) {
@@ -264,7 +264,7 @@ impl Daemon<'_> {
 
     /// Ends a job that is not wanted any more: at once, or when what is being rendered of it has stopped.
     fn cancel(&mut self, id: u64, why: &str) {
-        let is_rendering = self.current == Some(id);
+        let is_rendering = self.current.contains(&id);
         let Some(entry) = self.entries.get_mut(&id) else { return };
         if is_rendering {
             entry.unwanted = Some(why.to_owned());

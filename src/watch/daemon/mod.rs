@@ -15,11 +15,11 @@ use super::renderer::Renderer;
 use super::view::Shared;
 use super::{Ended, Message, WatchError, WatchEvent, WatchOptions, cannot, job, page};
 use crate::clock::Stopwatch;
-use crate::device::{Device, Stop};
+use crate::device::Stop;
 use crate::job::Request;
-use crate::run::DeviceReport;
+use crate::run::{DeviceReport, Fleet};
 use entry::{Entry, Phase};
-use std::collections::{BTreeMap, HashMap, HashSet};
+use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
 use std::ffi::OsString;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -56,8 +56,8 @@ pub(super) struct Daemon<'a> {
     entries: BTreeMap<u64, Entry>,
     by_file: HashMap<OsString, u64>,
     last_id: u64,
-    /// The job that is being rendered.
-    current: Option<u64>,
+    /// The jobs that are being rendered.
+    current: BTreeSet<u64>,
     /// When each job was first seen, by its name, as earlier daemons wrote it down.
     received: HashMap<String, u64>,
     devices: Vec<DeviceReport>,
@@ -77,7 +77,7 @@ impl<'a> Daemon<'a> {
     /// Opens everything that must be there before the first job.
     pub(super) fn open(
         options: &'a WatchOptions,
-        devices: Vec<Box<dyn Device>>,
+        fleet: Fleet,
         on_event: &'a mut dyn FnMut(&WatchEvent<'_>),
     ) -> Result<Self, WatchError> {
         fs::read_dir(&options.inbox).map_err(cannot("read", &options.inbox))?;
@@ -101,7 +101,7 @@ impl<'a> Daemon<'a> {
         }
         let at = options.listen.zip(view.as_ref()).map(|(at, view)| page::serve(at, view)).transpose()?;
         let (hints, no_hints) = Hints::listen(&options.inbox, send.clone());
-        let renderer = Renderer::start(devices, options.run.clone(), send.clone());
+        let renderer = Renderer::start(fleet, &options.run, &send);
         let mut daemon = Self {
             options,
             on_event,
@@ -119,7 +119,7 @@ impl<'a> Daemon<'a> {
             entries: BTreeMap::new(),
             by_file: HashMap::new(),
             last_id: 0,
-            current: None,
+            current: BTreeSet::new(),
             received: known.into_iter().map(|s| (s.job, s.times.received_ms)).collect(),
             said: HashMap::new(),
             others: HashSet::new(),
@@ -179,7 +179,7 @@ impl<'a> Daemon<'a> {
         }
         if stop.asked() && !self.stopping {
             self.stopping = true;
-            if let Some(stop) = self.current.and_then(|id| self.entries.get(&id)?.stop.clone()) {
+            for stop in self.current.iter().filter_map(|id| self.entries.get(id)?.stop.as_ref()) {
                 stop.ask();
             }
         }
@@ -205,7 +205,7 @@ impl<'a> Daemon<'a> {
     fn end(&mut self) -> Option<Ended> {
         let stopped = self.stopping;
         let is_over = if stopped {
-            self.current.is_none()
+            self.current.is_empty()
         } else {
             self.options.once && self.listed && self.entries.values().all(Entry::is_over)
         };

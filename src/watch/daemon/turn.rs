@@ -5,7 +5,7 @@ use super::{AGAIN, Daemon};
 use crate::device::Stop;
 use crate::run::{Event, FrameReport, Outcome};
 use crate::watch::inbox::Kind;
-use crate::watch::renderer::{Order, Told};
+use crate::watch::renderer::{JOBS_AT_ONCE, Order, Told};
 use crate::watch::state::{FrameCounts, State, Status};
 use crate::watch::{WatchEvent, cannot, job};
 use std::cmp::Reverse;
@@ -36,18 +36,23 @@ impl Daemon<'_> {
         }
     }
 
-    /// Begins the job whose turn it is: of the highest priority, then the one that came first.
+    /// Begins the jobs whose turn it is: of the highest priority, then those that came first.
     pub(super) fn take_turns(&mut self) {
-        while self.current.is_none() && !self.stopping && self.now() >= self.blocked_until {
+        while self.current.len() < JOBS_AT_ONCE && !self.stopping && self.now() >= self.blocked_until {
             let now = self.now();
-            let waits = |e: &&Entry| {
+            let waits = |id: &u64, e: &Entry| {
                 let grows = e.phase == Phase::Settling
                     && e.session.as_ref().is_some_and(|s| s.fits == Some(true) && !s.ready.is_empty());
-                e.named && e.retry <= now && !e.gone && (e.phase == Phase::Queued || grows)
+                !self.current.contains(id)
+                    && e.named
+                    && e.retry <= now
+                    && !e.gone
+                    && (e.phase == Phase::Queued || grows)
             };
             let order =
                 |(id, e): &(&u64, &Entry)| (Reverse(e.status.priority), e.status.times.received_ms, **id);
-            let next = self.entries.iter().filter(|(_, e)| waits(e)).min_by_key(order).map(|(id, _)| *id);
+            let next =
+                self.entries.iter().filter(|(id, e)| waits(id, e)).min_by_key(order).map(|(id, _)| *id);
             let Some(id) = next else { return };
             self.begin(id);
         }
@@ -95,8 +100,9 @@ impl Daemon<'_> {
         if entry.status.state != State::Running {
             entry.enter(State::Running, None);
         }
-        let order = Order { id, place, defaults: Arc::clone(&self.defaults), only, followed, stop };
-        self.current = Some(id);
+        let priority = entry.status.priority;
+        let order = Order { id, place, defaults: Arc::clone(&self.defaults), only, followed, priority, stop };
+        self.current.insert(id);
         if !self.renderer.order(order) {
             self.told(
                 id,
@@ -183,7 +189,7 @@ impl Daemon<'_> {
 
     /// What is rendered of a job has come to its end, whatever that is.
     fn stopped(&mut self, id: u64, end: Result<&Outcome, String>) {
-        self.current = None;
+        self.current.remove(&id);
         let full = match &end {
             Ok(outcome) if outcome.failed().next().is_none() => None,
             _ => self.full_disk(),

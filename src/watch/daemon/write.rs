@@ -69,7 +69,7 @@ impl Daemon<'_> {
         entry.wrote = now;
         entry.dirty = false;
         let is_in_work =
-            self.current == Some(id) || entry.session.is_some() && entry.status.state == State::Running;
+            self.current.contains(&id) || entry.session.is_some() && entry.status.state == State::Running;
         if !is_in_work && let Some(claim) = entry.claim.take() {
             claim.give_back();
         }

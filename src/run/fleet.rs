@@ -1,0 +1,59 @@
+//! The devices of a process, which several runs may share at once.
+
+use super::report::DeviceReport;
+use super::share::Hub;
+use crate::device::{Device, DeviceInfo};
+use crate::schedule::{DeviceFacts, Policy};
+use std::sync::{Mutex, MutexGuard, PoisonError};
+
+/// Devices, and who has which of them when.
+pub struct Fleet {
+    devices: Vec<Shared>,
+    pub(super) hub: Hub,
+}
+
+/// A device that runs take in turns: each has it for the frames that are leased to it.
+pub(super) struct Shared {
+    pub(super) info: DeviceInfo,
+    held: Mutex<Held>,
+}
+
+/// A device while a run has it.
+pub(super) struct Held {
+    pub(super) device: Box<dyn Device>,
+    /// Whether what it holds is not to be trusted, because it panicked.
+    pub(super) forget: bool,
+}
+
+impl Fleet {
+    /// Takes devices; frames are shared out over them by a policy.
+    pub fn new(devices: Vec<Box<dyn Device>>, policy: Policy) -> Self {
+        // what two devices take for a frame is never quite the same
+        let facts = |(kind, device): (usize, &Box<dyn Device>)| DeviceFacts {
+            budget_bytes: device.info().budget_bytes,
+            kind,
+        };
+        let facts: Vec<_> = devices.iter().enumerate().map(facts).collect();
+        let shared = |device: Box<dyn Device>| Shared {
+            info: device.info().clone(),
+            held: Mutex::new(Held { device, forget: false }),
+        };
+        Self { devices: devices.into_iter().map(shared).collect(), hub: Hub::new(policy, &facts) }
+    }
+
+    /// What the devices are.
+    pub fn reports(&self) -> Vec<DeviceReport> {
+        self.devices.iter().map(|device| DeviceReport::new(&device.info)).collect()
+    }
+
+    pub(super) fn devices(&self) -> &[Shared] {
+        &self.devices
+    }
+}
+
+impl Shared {
+    /// Waits until no other run has it.
+    pub(super) fn take(&self) -> MutexGuard<'_, Held> {
+        self.held.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
