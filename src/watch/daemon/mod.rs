@@ -213,6 +213,9 @@ impl<'a> Daemon<'a> {
             return None;
         }
         self.let_go();
+        if stopped && let Some(notifier) = &mut self.notifier {
+            notifier.leave();
+        }
         let failed = self.entries.values().filter(|e| e.has_failed()).count();
         Some(Ended { failed, stopped })
     }

@@ -10,8 +10,7 @@ use crate::watch::state::{FrameCounts, State, Status};
 use crate::watch::{WatchEvent, cannot, job};
 use std::cmp::Reverse;
 use std::fs;
-use std::io::{ErrorKind, Write};
-use std::path::PathBuf;
+use std::io::Write;
 use std::sync::Arc;
 
 /// What must fit onto the disk before it is thought to have space again.
@@ -244,20 +243,16 @@ impl Daemon<'_> {
         }
     }
 
-    /// Whether the output folder has no space left: what to say then.
-    fn full_disk(&self) -> Option<String> {
-        let path: PathBuf = self.own("space");
+    /// Whether the output folder cannot be written, for want of space mostly: what to say then.
+    pub(super) fn full_disk(&self) -> Option<String> {
+        let path = self.own("space");
         let written = fs::File::create(&path).and_then(|mut file| {
             file.write_all(&vec![0xa5; SPACE_BYTES])?;
             file.sync_data()
         });
         let _ = fs::remove_file(&path);
         let error = written.err()?;
-        let is_full = matches!(
-            error.kind(),
-            ErrorKind::StorageFull | ErrorKind::QuotaExceeded | ErrorKind::ReadOnlyFilesystem
-        );
-        is_full
-            .then(|| format!("{}: {error}; the jobs wait until there is space", self.options.out.display()))
+        let out = self.options.out.display();
+        Some(format!("{out}: cannot be written: {error}; the jobs wait until it can be"))
     }
 }

@@ -24,7 +24,10 @@ impl Daemon<'_> {
             if let Err(error) = self.write(id) {
                 self.in_the_way(&error.to_string());
                 let again = self.now() + AGAIN;
-                self.blocked_until = again;
+                // one job whose folder refuses does not stop the others
+                if self.full_disk().is_some() {
+                    self.blocked_until = again;
+                }
                 if let Some(entry) = self.entries.get_mut(&id) {
                     entry.retry = again;
                 }
