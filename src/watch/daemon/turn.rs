@@ -38,6 +38,13 @@ impl Daemon<'_> {
     /// Begins the job whose turn it is: of the highest priority, then the one that came first.
     pub(super) fn take_turns(&mut self) {
         while self.current.is_none() && !self.stopping && self.now() >= self.blocked_until {
+            if self.is_full
+                && let Some(why) = self.full_disk()
+            {
+                self.blocked_until = self.now() + AGAIN;
+                return self.in_the_way(&why);
+            }
+            self.is_full = false;
             let now = self.now();
             let waits = |e: &&Entry| {
                 let grows = e.phase == Phase::Settling
@@ -207,6 +214,7 @@ impl Daemon<'_> {
             entry.session = None;
             entry.enter(State::Queued, Some(why.clone()));
             self.blocked_until = self.now() + AGAIN;
+            self.is_full = true;
             self.in_the_way(&why);
         } else if !grows {
             match end {
