@@ -186,7 +186,16 @@ pub fn render(
             let (note, flight, device) = (note.clone(), &flight, &mut *device);
             scope.spawn(move || {
                 let frames = job.pictures.len();
-                trace::device_stage(device, options, frames, &from_readers, flight, stop, &to_writers, &note);
+                trace::device_stage(
+                    device,
+                    options,
+                    frames,
+                    &from_readers,
+                    flight,
+                    stop,
+                    &to_writers,
+                    &note,
+                );
             });
         }
         for _ in 0..threads {
