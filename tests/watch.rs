@@ -353,3 +353,47 @@ fn signals_end_the_daemon_and_its_jobs_go_on_later() {
         assert_eq!(w.done("walk").len(), 12);
     }
 }
+
+#[cfg(unix)]
+#[test]
+fn a_running_daemon_sees_what_changes_and_what_is_cancelled() {
+    let w = Watched::new();
+    let folder = w.job("walk", 2);
+    let mut args = w.args(&["--eye", "0,1,5", "--look-at", "0,0,0"]);
+    args.retain(|a| a != "--once");
+    let mut child =
+        common::rentix(w.t.path()).args(args).stderr(std::process::Stdio::null()).spawn().unwrap();
+    let mut until = |what: &str, ready: &dyn Fn() -> bool| {
+        while !ready() {
+            assert!(child.try_wait().unwrap().is_none(), "{what}: the daemon ended");
+            std::thread::yield_now();
+        }
+    };
+    let is = |job: &str, state: &str, done: u64| {
+        w.path("done").join(job).join("status.json").exists() && {
+            let status = w.status(job);
+            status["state"] == state && status["frames"]["done"] == done
+        }
+    };
+    until("first", &|| is("walk", "finished", 2));
+    w.job("walk", 3);
+    until("grown", &|| is("walk", "finished", 3));
+    fs::write(folder.join("wave_0002.obj"), "v 0 0 0\nf 1 2 3\n").unwrap();
+    until("spoilt", &|| is("walk", "failed", 2));
+    w.job("walk", 3);
+    until("mended", &|| is("walk", "finished", 3));
+    // a long one is cancelled while it is rendered, and then taken out of the inbox; a short one goes on
+    let text = "sequence: .\nsamples: 60000\noutput: {size: [640, 360]}\n";
+    let long = w.path("long");
+    wave(&long, 2, 6, 8);
+    fs::write(long.join("job.yaml"), text).unwrap();
+    fs::rename(&long, w.path("inbox/long")).unwrap();
+    until("long", &|| is("long", "running", 0));
+    fs::write(w.path("inbox/long.cancel"), "").unwrap();
+    until("cancelled", &|| is("long", "cancelled", 0));
+    w.job("short", 1);
+    until("short", &|| is("short", "finished", 1));
+    let kill = std::process::Command::new("kill").arg("-TERM").arg(child.id().to_string()).status().unwrap();
+    assert!(kill.success());
+    assert_eq!(child.wait().unwrap().code(), Some(143));
+}

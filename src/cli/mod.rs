@@ -122,6 +122,7 @@ enum Command {
 
 /// Runs the program; the exit status is CONTRACT 1's.
 pub fn main() -> ExitCode {
+    stop::early();
     let cli = match Cli::try_parse() {
         Ok(cli) => cli,
         Err(error) => {

@@ -2,10 +2,11 @@
 
 use crate::device::Stop;
 use anyhow::{Context, Result};
-use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Arc, OnceLock};
 
 /// Asked by signals.
+#[derive(Clone)]
 pub(super) struct OnSignals {
     /// What the run looks at.
     pub(super) asked: Arc<Stop>,
@@ -19,9 +20,27 @@ impl OnSignals {
     }
 }
 
+static LISTENING: OnceLock<OnSignals> = OnceLock::new();
+
+/// Listens before anything else is done, where a daemon is started: whoever started it may stop it at once.
+pub(super) fn early() {
+    if std::env::args_os().any(|word| word == "watch") {
+        // what is wrong is told by whoever needs the signals
+        let _ = on_signals();
+    }
+}
+
 /// Listens from now on.
-#[cfg(unix)]
 pub(super) fn on_signals() -> Result<OnSignals> {
+    if let Some(listening) = LISTENING.get() {
+        return Ok(listening.clone());
+    }
+    let on = listen()?;
+    Ok(LISTENING.get_or_init(|| on).clone())
+}
+
+#[cfg(unix)]
+fn listen() -> Result<OnSignals> {
     use signal_hook::consts::{SIGINT, SIGTERM};
     let on = OnSignals { asked: Arc::default(), signal: Arc::default() };
     let mut signals =
@@ -42,6 +61,6 @@ pub(super) fn on_signals() -> Result<OnSignals> {
 
 /// Signals are not caught on this system.
 #[cfg(not(unix))]
-pub(super) fn on_signals() -> Result<OnSignals> {
+fn listen() -> Result<OnSignals> {
     Ok(OnSignals { asked: Arc::default(), signal: Arc::new(AtomicUsize::new(2)) })
 }

@@ -21,7 +21,7 @@ pub(super) struct WatchArgs {
     pub render: RenderArgs,
 
     /// A job is whole when nothing in it has changed for so many seconds [default: 2]
-    #[arg(long, value_name = "SECONDS", help_heading = "Watching")]
+    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true, help_heading = "Watching")]
     pub settle: Option<f64>,
     /// Render frames of sequences that are still growing, as they come
     #[arg(long, help_heading = "Watching")]
@@ -57,7 +57,6 @@ const SETTLE_MAX_S: f64 = 86_400.0;
 
 /// Watches a folder and renders what is put into it.
 pub(super) fn watch(args: &WatchArgs, global: &Global) -> Result<ExitCode> {
-    // first of all: whoever starts a daemon may stop it at once
     let stop = stop::on_signals()?;
     let render = &args.render;
     let [inbox] = render.inputs.as_slice() else {

@@ -3,6 +3,7 @@
 use super::JobError;
 use super::file::{self, JobFile};
 use super::options::{Background, Options};
+use crate::format::{self, ReadOptions};
 use std::path::{Component, Path, PathBuf};
 
 /// The priority that a job file asks for, where it can be read and asks for one.
@@ -30,6 +31,9 @@ pub(super) fn check_file(job: &JobFile, path: &Path, folder: &Path) -> Result<()
     let layers = job.layers.iter().flat_map(|l| [Some(&l.sequence), l.materials.as_ref()]).flatten();
     let own = path.parent().unwrap_or(Path::new(""));
     for named in job.sequence.iter().chain(layers).chain(backgrounds) {
+        if is_odd(named) {
+            return refused(format!("{} is no plain file", named.display()));
+        }
         // what is relative was joined to the job file's folder
         let stays =
             named.strip_prefix(own).is_ok_and(stays) && real(named).is_none_or(|r| r.starts_with(folder));
@@ -40,13 +44,33 @@ pub(super) fn check_file(job: &JobFile, path: &Path, folder: &Path) -> Result<()
     Ok(())
 }
 
-/// Refuses files that lie elsewhere, as links make them.
+/// Refuses files that lie elsewhere, as links make them, and what is no plain file: a pipe is never read to its end. What a
+/// glTF names counts, too; what an OBJ names is looked at when it is read.
 pub(super) fn check_inputs(inputs: &[PathBuf], folder: &Path) -> Result<(), JobError> {
-    let elsewhere = |file: &&PathBuf| real(file).is_some_and(|real| !real.starts_with(folder));
-    inputs.iter().find(elsewhere).map_or(Ok(()), |file| {
-        let text = "is a link that leads out of the job's folder; put the file itself there".to_owned();
-        Err(JobError::Dropped { path: file.clone(), text })
-    })
+    for input in inputs {
+        check_input(input, folder)?;
+        if format::is_gltf(input) {
+            for named in format::named_files(input, &ReadOptions::default()) {
+                check_input(&named, folder)?;
+            }
+        }
+    }
+    Ok(())
+}
+
+fn check_input(input: &Path, folder: &Path) -> Result<(), JobError> {
+    let refused = |text: &str| Err(JobError::Dropped { path: input.to_path_buf(), text: text.to_owned() });
+    if real(input).is_some_and(|real| !real.starts_with(folder)) {
+        return refused(
+            "lies outside the job's folder, or is a link that leads there; put the file itself into it",
+        );
+    }
+    if is_odd(input) { refused("is no plain file") } else { Ok(()) }
+}
+
+/// Whether something is there that is neither a file nor a folder.
+fn is_odd(path: &Path) -> bool {
+    path.exists() && !path.is_file() && !path.is_dir()
 }
 
 fn real(path: &Path) -> Option<PathBuf> {
@@ -153,8 +177,19 @@ mod tests {
         std::fs::create_dir(&folder).unwrap();
         std::fs::write(root.join("a_1.obj"), TRIANGLE).unwrap();
         std::os::unix::fs::symlink(root.join("a_1.obj"), folder.join("a_1.obj")).unwrap();
-        let request = Request { inputs: vec![folder.clone()], dropped: Some(folder), ..Request::default() };
+        let request =
+            Request { inputs: vec![folder.clone()], dropped: Some(folder.clone()), ..Request::default() };
         let error = resolve(&request).unwrap_err().to_string();
         assert!(error.contains("a_1.obj") && error.contains("link"), "{error}");
+        std::fs::remove_file(folder.join("a_1.obj")).unwrap();
+        let made = std::process::Command::new("mkfifo").arg(folder.join("a_1.obj")).status().unwrap();
+        assert!(made.success());
+        let error = resolve(&request).unwrap_err().to_string();
+        assert!(error.contains("a_1.obj") && error.contains("no plain file"), "{error}");
+        std::fs::remove_file(folder.join("a_1.obj")).unwrap();
+        let gltf = r#"{"asset": {"version": "2.0"}, "buffers": [{"uri": "../a_1.obj", "byteLength": 1}]}"#;
+        std::fs::write(folder.join("a.gltf"), gltf).unwrap();
+        let error = resolve(&request).unwrap_err().to_string();
+        assert!(error.contains("a_1.obj"), "{error}");
     }
 }

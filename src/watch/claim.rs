@@ -45,7 +45,7 @@ impl Claims {
         let mut claims =
             Self { folder: folder.to_path_buf(), me: own_name("", ""), beaten: None, beats: HashMap::new() };
         claims.beat(now)?;
-        claims.sweep();
+        claims.sweep(now);
         Ok(claims)
     }
 
@@ -69,36 +69,46 @@ impl Claims {
         self.folder.join(format!("{owner}.alive"))
     }
 
-    /// Removes heartbeats of daemons of this host that have ended; what cannot be removed does no harm.
-    fn sweep(&self) {
+    /// Removes what daemons of this host that have ended left: heartbeats, drafts, and claims, those by taking them over as
+    /// anyone else would. What cannot be removed does no harm.
+    fn sweep(&mut self, now: Duration) {
         for entry in fs::read_dir(&self.folder).into_iter().flatten().flatten() {
             let name = entry.file_name();
-            if name.to_str().and_then(|n| n.strip_suffix(".alive")).is_some_and(is_gone) {
+            let Some((stem, end)) = name.to_str().and_then(|n| n.rsplit_once('.')) else { continue };
+            if matches!(end, "alive" | "new") && is_gone(stem) {
                 let _ = fs::remove_file(entry.path());
+            } else if end == "lock"
+                && let Some((hash, _)) = stem.split_once('.')
+                && let Ok(Some(claim)) = self.take_hash(hash, now)
+            {
+                claim.give_back();
             }
         }
     }
 
     /// Claims a job; None where another daemon has it.
     pub(super) fn take(&mut self, job: &str, now: Duration) -> Result<Option<Claim>, WatchError> {
-        let hash = format!("{:032x}", xxh3_128(job.as_bytes()));
-        let before = self.of_job(&hash)?;
+        self.take_hash(&format!("{:032x}", xxh3_128(job.as_bytes())), now)
+    }
+
+    fn take_hash(&mut self, hash: &str, now: Duration) -> Result<Option<Claim>, WatchError> {
+        let before = self.of_job(hash)?;
         if before.iter().any(|(_, owner)| self.lives(owner, now)) {
             return Ok(None);
         }
         let generation = before.iter().map(|(generation, _)| generation + 1).max().unwrap_or(0);
-        let path = self.lock(&hash, generation);
+        let path = self.lock(hash, generation);
         if !self.make(&path)? {
             return Ok(None);
         }
         let claim = Claim(path);
-        let others = self.of_job(&hash)?.into_iter().filter(|(g, _)| *g != generation).collect::<Vec<_>>();
+        let others = self.of_job(hash)?.into_iter().filter(|(g, _)| *g != generation).collect::<Vec<_>>();
         if others.iter().any(|(_, owner)| self.lives(owner, now)) {
             claim.give_back();
             return Ok(None);
         }
         for (generation, _) in others {
-            let _ = fs::remove_file(self.lock(&hash, generation));
+            let _ = fs::remove_file(self.lock(hash, generation));
         }
         Ok(Some(claim))
     }
@@ -232,7 +242,14 @@ mod tests {
             std::thread::yield_now();
         }
         a.take("walk", at(0)).unwrap().unwrap();
+        a.take("run", at(0)).unwrap().unwrap();
+        fs::write(t.path().join(format!("{}.new", a.me)), "").unwrap();
         let mut b = Claims::open(t.path(), at(0)).unwrap();
+        assert_eq!(
+            fs::read_dir(t.path()).unwrap().count(),
+            1,
+            "all that is left is the heartbeat of the living"
+        );
         assert!(b.take("walk", at(0)).unwrap().is_some());
         child.wait().unwrap();
     }

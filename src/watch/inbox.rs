@@ -97,11 +97,17 @@ pub(super) fn list(inbox: &Path) -> Result<Inbox, WatchError> {
     Ok(found)
 }
 
+/// No job's name is longer, so that there is room for what is added to it.
+const NAME_BYTES_MAX: usize = 200;
+
 /// A name that is good for a folder and a terminal.
 fn plain(text: &str) -> String {
-    text.chars()
-        .map(|c| if c.is_control() || c == '\\' || c == char::REPLACEMENT_CHARACTER { '_' } else { c })
-        .collect()
+    let bad = |c: char| c.is_control() || c == '\\' || c == char::REPLACEMENT_CHARACTER;
+    let mut name: String = text.chars().map(|c| if bad(c) { '_' } else { c }).collect();
+    while name.len() > NAME_BYTES_MAX {
+        name.pop();
+    }
+    name
 }
 
 /// Looks at one job: everything inside it, and what is said beside it.

@@ -89,6 +89,12 @@ impl Notifier {
         Ok(Some(Self { waiting: Some(waiting), thread: Some(thread) }))
     }
 
+    /// What still waits is not told: the daemon ends at once.
+    pub(super) fn leave(&mut self) {
+        self.waiting = None;
+        self.thread = None;
+    }
+
     /// Tells of a job that ended; what is said where that cannot be.
     pub(super) fn tell(&self, status: &Status, folder: &Path) -> Result<(), String> {
         let waiting = self.waiting.as_ref().ok_or("nobody tells any more")?;

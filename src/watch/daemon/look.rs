@@ -141,6 +141,8 @@ impl Daemon<'_> {
                 if is_wanted_again || entry.status.run != run && !seen.cancelled {
                     entry.phase = Phase::Settling;
                     entry.unwanted = None;
+                    // the end that is on the disk is that of another run
+                    entry.status.run.clear();
                     entry.enter(State::Received, None);
                 }
                 return;
@@ -207,9 +209,12 @@ impl Daemon<'_> {
         let (base, source) = (entry.found.name.clone(), entry.status.source.clone());
         for n in 1.. {
             let name = if n == 1 { base.clone() } else { format!("{base}-{n}") };
-            let known = match Status::read(&self.options.out.join(&name)) {
+            let folder = self.options.out.join(&name);
+            let known = match Status::read(&folder) {
                 Some(known) if known.source == source => Some(known),
                 Some(_) => continue,
+                // what is in the way of a folder is someone else's
+                None if folder.exists() && !folder.is_dir() => continue,
                 None => None,
             };
             if let Some(known) = known {
@@ -224,7 +229,7 @@ impl Daemon<'_> {
                     return self.later(id);
                 }
             };
-            if Status::read(&self.options.out.join(&name)).is_some() {
+            if Status::read(&folder).is_some() {
                 claim.give_back();
                 return self.later(id);
             }

@@ -67,6 +67,8 @@ pub(super) struct Daemon<'a> {
     others: HashSet<OsString>,
     /// Nothing is begun before: the output folder cannot be written.
     blocked_until: Duration,
+    /// It could not be written when that was tried last.
+    is_full: bool,
     trouble: Option<(String, Duration)>,
     stopping: bool,
     /// Whether the inbox could be listed, and all in it was looked at.
@@ -124,6 +126,7 @@ impl<'a> Daemon<'a> {
             said: HashMap::new(),
             others: HashSet::new(),
             blocked_until: Duration::ZERO,
+            is_full: false,
             trouble: None,
             stopping: false,
             listed: false,
@@ -213,6 +216,9 @@ impl<'a> Daemon<'a> {
             return None;
         }
         self.let_go();
+        if stopped && let Some(notifier) = &mut self.notifier {
+            notifier.leave();
+        }
         let failed = self.entries.values().filter(|e| e.has_failed()).count();
         Some(Ended { failed, stopped })
     }

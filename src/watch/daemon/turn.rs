@@ -10,8 +10,7 @@ use crate::watch::state::{FrameCounts, State, Status};
 use crate::watch::{WatchEvent, cannot, job};
 use std::cmp::Reverse;
 use std::fs;
-use std::io::{ErrorKind, Write};
-use std::path::PathBuf;
+use std::io::Write;
 use std::sync::Arc;
 
 /// What must fit onto the disk before it is thought to have space again.
@@ -39,6 +38,13 @@ impl Daemon<'_> {
     /// Begins the jobs whose turn it is: of the highest priority, then those that came first.
     pub(super) fn take_turns(&mut self) {
         while self.current.len() < JOBS_AT_ONCE && !self.stopping && self.now() >= self.blocked_until {
+            if self.is_full
+                && let Some(why) = self.full_disk()
+            {
+                self.blocked_until = self.now() + AGAIN;
+                return self.in_the_way(&why);
+            }
+            self.is_full = false;
             let now = self.now();
             let waits = |id: &u64, e: &Entry| {
                 let grows = e.phase == Phase::Settling
@@ -214,6 +220,7 @@ impl Daemon<'_> {
             entry.session = None;
             entry.enter(State::Queued, Some(why.clone()));
             self.blocked_until = self.now() + AGAIN;
+            self.is_full = true;
             self.in_the_way(&why);
         } else if !grows {
             match end {
@@ -250,20 +257,16 @@ impl Daemon<'_> {
         }
     }
 
-    /// Whether the output folder has no space left: what to say then.
-    fn full_disk(&self) -> Option<String> {
-        let path: PathBuf = self.own("space");
+    /// Whether the output folder cannot be written, for want of space mostly: what to say then.
+    pub(super) fn full_disk(&self) -> Option<String> {
+        let path = self.own("space");
         let written = fs::File::create(&path).and_then(|mut file| {
             file.write_all(&vec![0xa5; SPACE_BYTES])?;
             file.sync_data()
         });
         let _ = fs::remove_file(&path);
         let error = written.err()?;
-        let is_full = matches!(
-            error.kind(),
-            ErrorKind::StorageFull | ErrorKind::QuotaExceeded | ErrorKind::ReadOnlyFilesystem
-        );
-        is_full
-            .then(|| format!("{}: {error}; the jobs wait until there is space", self.options.out.display()))
+        let out = self.options.out.display();
+        Some(format!("{out}: cannot be written: {error}; the jobs wait until it can be"))
     }
 }

@@ -6,6 +6,9 @@ use crate::watch::state::State;
 use crate::watch::{WatchError, WatchEvent};
 use std::time::Duration;
 
+/// Statuses are written for so long, the others' turn comes with the next call: thousands of new jobs do not keep the first
+/// from being begun.
+const WRITES: Duration = Duration::from_millis(200);
 /// How often progress alone is written.
 const PROGRESS: Duration = Duration::from_secs(1);
 
@@ -13,18 +16,27 @@ impl Daemon<'_> {
     /// Writes all statuses that are to be written and whose time it is.
     pub(super) fn write_all(&mut self) {
         let now = self.now();
-        let due: Vec<u64> = self
+        let mut due: Vec<(bool, u64)> = self
             .entries
             .iter()
             .filter(|(_, e)| e.dirty && e.named && e.retry <= now)
             .filter(|(_, e)| e.written != Some(e.status.state) || now.saturating_sub(e.wrote) >= PROGRESS)
-            .map(|(id, _)| *id)
+            .map(|(id, e)| (e.phase != Phase::Ended && self.current != Some(*id), *id))
             .collect();
-        for id in due {
+        // ends first
+        due.sort_unstable();
+        for (can_wait, id) in due {
+            if can_wait && self.now().saturating_sub(now) > WRITES {
+                break;
+            }
             if let Err(error) = self.write(id) {
                 self.in_the_way(&error.to_string());
                 let again = self.now() + AGAIN;
-                self.blocked_until = again;
+                // one job whose folder refuses does not stop the others
+                self.is_full = self.full_disk().is_some();
+                if self.is_full {
+                    self.blocked_until = again;
+                }
                 if let Some(entry) = self.entries.get_mut(&id) {
                     entry.retry = again;
                 }
