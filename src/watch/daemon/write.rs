@@ -21,7 +21,7 @@ impl Daemon<'_> {
             .iter()
             .filter(|(_, e)| e.dirty && e.named && e.retry <= now)
             .filter(|(_, e)| e.written != Some(e.status.state) || now.saturating_sub(e.wrote) >= PROGRESS)
-            .map(|(id, e)| (e.phase != Phase::Ended && self.current != Some(*id), *id))
+            .map(|(id, e)| (e.phase != Phase::Ended && !self.current.contains(id), *id))
             .collect();
         // ends first
         due.sort_unstable();
