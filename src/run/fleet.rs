@@ -4,7 +4,7 @@ use super::report::DeviceReport;
 use super::share::Hub;
 use crate::device::{Device, DeviceInfo};
 use crate::schedule::{DeviceFacts, Policy};
-use std::sync::{Mutex, MutexGuard, PoisonError};
+use parking_lot::{FairMutex, FairMutexGuard};
 
 /// Devices, and who has which of them when.
 pub struct Fleet {
@@ -12,10 +12,10 @@ pub struct Fleet {
     pub(super) hub: Hub,
 }
 
-/// A device that runs take in turns: each has it for the frames that are leased to it.
+/// A device that runs take in turns, in the order in which they ask: each has it while frames of it are under way.
 pub(super) struct Shared {
     pub(super) info: DeviceInfo,
-    held: Mutex<Held>,
+    held: FairMutex<Held>,
 }
 
 /// A device while a run has it.
@@ -36,7 +36,7 @@ impl Fleet {
         let facts: Vec<_> = devices.iter().enumerate().map(facts).collect();
         let shared = |device: Box<dyn Device>| Shared {
             info: device.info().clone(),
-            held: Mutex::new(Held { device, forget: false }),
+            held: FairMutex::new(Held { device, forget: false }),
         };
         Self { devices: devices.into_iter().map(shared).collect(), hub: Hub::new(policy, &facts) }
     }
@@ -53,7 +53,7 @@ impl Fleet {
 
 impl Shared {
     /// Waits until no other run has it.
-    pub(super) fn take(&self) -> MutexGuard<'_, Held> {
-        self.held.lock().unwrap_or_else(PoisonError::into_inner)
+    pub(super) fn take(&self) -> FairMutexGuard<'_, Held> {
+        self.held.lock()
     }
 }

@@ -7,6 +7,10 @@ use crate::schedule::{Costs, DeviceFacts, JobId, Lease, NewJob, Policy, Schedule
 use std::collections::{BTreeMap, HashMap};
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 
+/// Frames that are read ahead of a device keep it so long from other runs, s; two of them always, so that one is read while the
+/// other is traced.
+const AHEAD_S: f64 = 0.2;
+const AHEAD_LEAST: u64 = 2;
 /// On so many devices a frame is tried.
 const TRIES: usize = 2;
 
@@ -55,8 +59,8 @@ struct Feed {
 /// One of the runs.
 #[derive(Debug)]
 struct Run {
-    /// For each device the frames that its readers took, and those of them that the device took.
-    turns: Vec<[u64; 2]>,
+    /// For each device the frames that its readers took, those of them that the device took, and those that left it.
+    turns: Vec<[u64; 3]>,
     /// Frames that are neither traced nor given up.
     left: u64,
     /// Frames that failed, and the devices they failed on.
@@ -121,7 +125,7 @@ impl<'a> Share<'a> {
         let now_s = hub.clock.s();
         let frames = frames as u64;
         let job = hub.change(|s| {
-            let turns = vec![[0; 2]; s.feeds.len()];
+            let turns = vec![[0; 3]; s.feeds.len()];
             let job = s.scheduler.add(now_s, &NewJob { frames, grows: false, priority, costs, bytes: 0 })?;
             s.runs.insert(job, Run { turns, left: frames, failed: HashMap::new() });
             Ok(job)
@@ -158,7 +162,7 @@ impl<'a> Share<'a> {
     /// it are done, and those behind it wait for it.
     pub(super) fn take_bytes(&self, turn: Turn, bytes: u64) {
         let is_held_up = |s: &mut State| {
-            let [_, taken] = s.runs[&self.job].turns[turn.device];
+            let [_, taken, _] = s.runs[&self.job].turns[turn.device];
             taken < turn.turn && s.bytes.saturating_add(bytes) > self.budget_bytes
         };
         let waited = self.hub.changed.wait_while(self.hub.lock(), is_held_up);
@@ -181,7 +185,7 @@ impl<'a> Share<'a> {
     /// A frame is traced, in so many seconds of its device; or ended where it was read, in none.
     pub(super) fn done(&self, device: usize, index: usize, seconds: f64) {
         self.change(|s, run| {
-            s.feeds[device].left += 1;
+            s.leaves(run, device);
             if s.scheduler.done(device, self.job, index as u64, seconds) {
                 run.left -= 1;
             }
@@ -201,7 +205,7 @@ impl<'a> Share<'a> {
     pub(super) fn failed(&self, device: usize, index: usize) -> bool {
         let now_s = self.hub.clock.s();
         self.change(|s, run| {
-            s.feeds[device].left += 1;
+            s.leaves(run, device);
             let tried = run.failed.entry(index).or_default();
             tried.push(device);
             let is_other = |(d, feed): (usize, &Feed)| !feed.is_gone && !tried.contains(&d);
@@ -219,8 +223,8 @@ impl<'a> Share<'a> {
     /// A frame comes back untraced.
     pub(super) fn gave_back(&self, device: usize, index: usize) {
         let now_s = self.hub.clock.s();
-        self.change(|s, _| {
-            s.feeds[device].left += 1;
+        self.change(|s, run| {
+            s.leaves(run, device);
             let frame = index as u64;
             s.scheduler.give_back(now_s, device, self.job, frame..frame + 1, false);
         });
@@ -263,10 +267,29 @@ impl<'a> Share<'a> {
 }
 
 impl State {
+    /// A frame of a run has left a device's stage.
+    fn leaves(&mut self, run: &mut Run, device: usize) {
+        self.feeds[device].left += 1;
+        run.turns[device][2] += 1;
+    }
+
+    /// Whether a device has enough ahead of it.
+    fn is_fed(&self, device: usize, ahead: u64) -> bool {
+        let feed = &self.feeds[device];
+        if feed.is_gone || feed.given - feed.taken >= ahead {
+            return true;
+        }
+        let on_their_way = |(job, run): (&JobId, &Run)| {
+            let [given, _, left] = run.turns[device];
+            (given - left) as f64 * self.scheduler.frame_s(device, *job)
+        };
+        feed.given - feed.left >= AHEAD_LEAST && self.runs.iter().map(on_their_way).sum::<f64>() > AHEAD_S
+    }
+
     /// The next frame of a run, for the device that has the fewest ahead of it.
     fn next(&mut self, job: JobId, now_s: f64, ahead: u64) -> Option<Turn> {
         let mut hungry: Vec<usize> = (0..self.feeds.len()).collect();
-        hungry.retain(|&d| !self.feeds[d].is_gone && self.feeds[d].given - self.feeds[d].taken < ahead);
+        hungry.retain(|&d| !self.is_fed(d, ahead));
         hungry.sort_by_key(|&d| self.feeds[d].given - self.feeds[d].taken);
         for device in hungry {
             if self.feeds[device].lease.is_none() {
@@ -277,7 +300,7 @@ impl State {
             let Some(frame) = lease.frames.next() else { continue };
             feed.lease.take_if(|lease| lease.frames.is_empty());
             feed.given += 1;
-            let [given, _] = &mut self.runs.get_mut(&job)?.turns[device];
+            let [given, ..] = &mut self.runs.get_mut(&job)?.turns[device];
             *given += 1;
             return Some(Turn { device, index: frame as usize, turn: *given - 1 });
         }

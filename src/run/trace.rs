@@ -15,11 +15,12 @@ use crate::kernel::media::MEDIA_MAX;
 use crate::plan::{Action, Update, Wishes, plan_frame};
 use crate::scene::{Frame, PartHash};
 use crate::warning::Warnings;
+use parking_lot::FairMutexGuard;
 use std::collections::{BTreeMap, VecDeque};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
+use std::sync::Arc;
 use std::sync::mpsc::{Receiver, Sender, SyncSender, TryRecvError};
-use std::sync::{Arc, MutexGuard};
 
 /// Takes frames in their order, makes each resident, traces it and hands the film to a writer. As many frames are under way
 /// as the device takes; where no other is read yet, the first of them is waited for.
@@ -102,7 +103,7 @@ const LOSSES: usize = 3;
 struct DeviceStage<'a> {
     shared: &'a Shared,
     /// The device while frames are under way; between them other runs may have it.
-    held: Option<MutexGuard<'a, Held>>,
+    held: Option<FairMutexGuard<'a, Held>>,
     told: DeviceReport,
     /// Frames that were begun, the first one first.
     under_way: VecDeque<UnderWay>,

@@ -316,6 +316,11 @@ impl Scheduler {
         self.active == 0
     }
 
+    /// Seconds that a device should take for a frame of a job whose scene it holds.
+    pub fn frame_s(&self, device: usize, job: JobId) -> f64 {
+        self.jobs.get(job.0).map_or(0.0, |_| self.costs(device, job.0).0)
+    }
+
     /// Seconds of a frame and of making the scene resident, as a device should take them now.
     pub(super) fn costs(&self, device: usize, job: usize) -> (f64, f64) {
         let facing = &self.devices[device];
