@@ -101,12 +101,23 @@ fn render_farms_read_progress() {
     let t = t.path();
     let input = wave(&t.join("w"), 2, 4, 7);
     for (kind, lines) in [
-        ("openjd", "openjd_progress: 50.0\nopenjd_progress: 100.0\n"),
+        ("openjd", "openjd_progress: 50.0\nopenjd_progress: 100.0\nopenjd_status: 2 of 2 frames, 0 failed\n"),
         ("alf", "ALF_PROGRESS 50%\nALF_PROGRESS 100%\n"),
-        ("afanasy", "PROGRESS: 50%\nPROGRESS: 100%\n"),
     ] {
         assert_eq!(render(t, &input, kind, &["--size", "32x18", "--progress", kind], 0).stdout, lines);
     }
+    // pictures may end in any order
+    let told = render(t, &input, "afanasy", &["--size", "32x18", "--progress", "afanasy"], 0).stdout;
+    let lines: Vec<&str> = told.lines().collect();
+    assert_eq!([lines[0], lines[2]], ["PROGRESS: 50%", "PROGRESS: 100%"]);
+    for picture in [lines[1], lines[3]] {
+        let path = picture.strip_prefix("@IMAGE@").unwrap();
+        assert!(t.join(path).is_file(), "{picture}");
+    }
+    // a frame that fails fails its chunk
+    std::fs::write(input.join("wave_0002.obj"), "f 1 2 3\n").unwrap();
+    let told = render(t, &input, "openjd", &["--size", "32x18", "--progress", "openjd"], 1).stdout;
+    assert!(told.ends_with("openjd_fail: 1 frames failed\n"), "{told}");
 }
 
 /// Nine panes of refracting glass, each entered and none left.

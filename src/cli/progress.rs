@@ -1,11 +1,13 @@
 //! Progress on stderr: a bar on a terminal, elsewhere a plain line at most every 5 s.
 
+use super::stop;
 use crate::clock::Stopwatch;
 use crate::run::{Event, FrameReport, Status};
 use crate::warning::Warning;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::collections::BTreeMap;
 use std::io::IsTerminal;
+use std::path::Path;
 use std::time::Duration;
 
 /// How progress is shown.
@@ -38,6 +40,8 @@ pub(super) struct Progress {
     verbose: bool,
     since: Stopwatch,
     told_s: f64,
+    /// Where pictures go.
+    folder: String,
     frames: usize,
     ended: usize,
     failed: usize,
@@ -73,6 +77,7 @@ impl Progress {
             verbose,
             since: Stopwatch::start(),
             told_s: 0.0,
+            folder: String::new(),
             frames: 0,
             ended: 0,
             failed: 0,
@@ -83,8 +88,10 @@ impl Progress {
     /// Shows an event.
     pub(super) fn event(&mut self, event: &Event) {
         match event {
-            Event::Start { frames, .. } => {
+            Event::Start { frames, folder, .. } => {
+                self.folder.clone_from(folder);
                 self.frames = *frames;
+                stop::keep_state([0, 0, *frames]);
                 if let Some(bar) = &self.bar {
                     bar.set_length(*frames as u64);
                 }
@@ -123,11 +130,18 @@ impl Progress {
                 ms(frame.ms.write),
             ));
         }
+        stop::keep_state([self.ended, self.failed, self.frames]);
         let percent = 100.0 * self.ended.min(self.frames) as f64 / self.frames.max(1) as f64;
         match self.kind {
             ProgressKind::Openjd => println!("openjd_progress: {percent:.1}"),
             ProgressKind::Alf => println!("ALF_PROGRESS {percent:.0}%"),
-            ProgressKind::Afanasy => println!("PROGRESS: {percent:.0}%"),
+            ProgressKind::Afanasy => {
+                println!("PROGRESS: {percent:.0}%");
+                if frame.status != Status::Failed {
+                    // what its monitor shows of the frame
+                    println!("@IMAGE@{}", Path::new(&self.folder).join(&frame.picture).display());
+                }
+            }
             _ => {}
         }
         if let Some(bar) = &self.bar {
@@ -158,6 +172,13 @@ impl Progress {
     pub(super) fn end(&self) {
         if let Some(bar) = &self.bar {
             bar.finish_and_clear();
+        }
+        if self.kind == ProgressKind::Openjd {
+            let (done, failed) = (self.ended - self.failed, self.failed);
+            println!("openjd_status: {done} of {} frames, {failed} failed", self.frames);
+            if failed > 0 {
+                println!("openjd_fail: {failed} frames failed");
+            }
         }
         for (text, files) in self.warned.iter().filter(|(_, files)| **files > FILES_TOLD && !self.verbose) {
             eprintln!("warning: the same for {} more files: {text}", files - FILES_TOLD);

@@ -1,4 +1,4 @@
-//! SIGINT and SIGTERM ask the run to stop; a second one ends the process at once.
+//! SIGINT and SIGTERM ask the run to stop; a second one ends the process at once. SIGUSR1 asks how far it is.
 
 use crate::device::Stop;
 use anyhow::{Context, Result};
@@ -22,6 +22,16 @@ impl OnSignals {
 
 static LISTENING: OnceLock<OnSignals> = OnceLock::new();
 
+/// How far the run is: frames that ended, those of them that failed, all.
+static STATE: [AtomicUsize; 3] = [const { AtomicUsize::new(0) }; 3];
+
+/// Keeps how far the run is, for whoever asks by SIGUSR1.
+pub(super) fn keep_state(frames: [usize; 3]) {
+    for (state, now) in STATE.iter().zip(frames) {
+        state.store(now, Ordering::Relaxed);
+    }
+}
+
 /// Listens before anything else is done, where a daemon is started: whoever started it may stop it at once.
 pub(super) fn early() {
     if std::env::args_os().any(|word| word == "watch") {
@@ -41,13 +51,18 @@ pub(super) fn on_signals() -> Result<OnSignals> {
 
 #[cfg(unix)]
 fn listen() -> Result<OnSignals> {
-    use signal_hook::consts::{SIGINT, SIGTERM};
+    use signal_hook::consts::{SIGINT, SIGTERM, SIGUSR1};
     let on = OnSignals { asked: Arc::default(), signal: Arc::default() };
-    let mut signals =
-        signal_hook::iterator::Signals::new([SIGINT, SIGTERM]).context("signals cannot be caught")?;
+    let mut signals = signal_hook::iterator::Signals::new([SIGINT, SIGTERM, SIGUSR1])
+        .context("signals cannot be caught")?;
     let (asked, signal) = (Arc::clone(&on.asked), Arc::clone(&on.signal));
     std::thread::spawn(move || {
         for s in signals.forever() {
+            if s == SIGUSR1 {
+                let [ended, failed, all] = [0, 1, 2].map(|i| STATE[i].load(Ordering::Relaxed));
+                eprintln!("{ended} of {all} frames have ended, {failed} failed");
+                continue;
+            }
             if asked.asked() {
                 // 128 + n is what a shell reports for a process that signal n ended
                 std::process::exit(128 + s);

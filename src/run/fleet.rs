@@ -29,11 +29,9 @@ impl Fleet {
     /// Takes devices; frames are shared out over them by a policy.
     pub fn new(devices: Vec<Box<dyn Device>>, policy: Policy) -> Self {
         // what two devices take for a frame is never quite the same
-        let facts = |(kind, device): (usize, &Box<dyn Device>)| DeviceFacts {
-            budget_bytes: device.info().budget_bytes,
-            kind,
-        };
-        let facts: Vec<_> = devices.iter().enumerate().map(facts).collect();
+        let budgets = devices.iter().map(|device| device.info().budget_bytes);
+        let facts: Vec<_> =
+            budgets.enumerate().map(|(kind, budget_bytes)| DeviceFacts { budget_bytes, kind }).collect();
         let shared = |device: Box<dyn Device>| Shared {
             info: device.info().clone(),
             held: FairMutex::new(Held { device, forget: false }),

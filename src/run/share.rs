@@ -22,7 +22,7 @@ pub(super) struct Turn {
     /// The place of its picture in the job.
     pub(super) index: usize,
     /// Its place among all of its run that are read for that device, which takes them in that order.
-    pub(super) turn: u64,
+    pub(super) place: u64,
 }
 
 /// The frames of all runs, shared out.
@@ -163,7 +163,7 @@ impl<'a> Share<'a> {
     pub(super) fn take_bytes(&self, turn: Turn, bytes: u64) {
         let is_held_up = |s: &mut State| {
             let [_, taken, _] = s.runs[&self.job].turns[turn.device];
-            taken < turn.turn && s.bytes.saturating_add(bytes) > self.budget_bytes
+            taken < turn.place && s.bytes.saturating_add(bytes) > self.budget_bytes
         };
         let waited = self.hub.changed.wait_while(self.hub.lock(), is_held_up);
         waited.unwrap_or_else(PoisonError::into_inner).bytes += bytes;
@@ -302,7 +302,7 @@ impl State {
             feed.given += 1;
             let [given, ..] = &mut self.runs.get_mut(&job)?.turns[device];
             *given += 1;
-            return Some(Turn { device, index: frame as usize, turn: *given - 1 });
+            return Some(Turn { device, index: frame as usize, place: *given - 1 });
         }
         None
     }
@@ -330,7 +330,7 @@ mod tests {
         let share = share(&hub, 100, 3, u64::MAX);
         let (mut seen, mut turns) = (vec![0; 100], [0; 2]);
         while let Some(turn) = share.next(&stop) {
-            assert_eq!(turn.turn, turns[turn.device]);
+            assert_eq!(turn.place, turns[turn.device]);
             turns[turn.device] += 1;
             seen[turn.index] += 1;
             share.taken(turn.device);

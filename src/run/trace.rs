@@ -55,7 +55,7 @@ pub(super) fn device_stage(
         };
         match read {
             Ok(read) => {
-                waiting.insert(read.turn.turn, read);
+                waiting.insert(read.turn.place, read);
             }
             Err(TryRecvError::Empty) => {
                 stage.finish_first();
