@@ -397,3 +397,26 @@ fn a_running_daemon_sees_what_changes_and_what_is_cancelled() {
     assert!(kill.success());
     assert_eq!(child.wait().unwrap().code(), Some(143));
 }
+
+#[test]
+#[cfg(unix)]
+fn a_daemon_tells_how_far_it_is_and_ends_when_it_is_asked() {
+    use std::io::{BufRead, BufReader};
+    use std::process::{Command, Stdio};
+    let w = Watched::new();
+    let mut args = w.args(&["--device", "cpu", "--json"]);
+    args.retain(|arg| arg != "--once");
+    let mut daemon =
+        common::rentix(w.t.path()).args(args).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+    let id = daemon.id().to_string();
+    let signal = |name: &str| assert!(Command::new("kill").args([name, &id]).status().unwrap().success());
+    let mut ready = String::new();
+    let mut told = BufReader::new(daemon.stdout.take().unwrap());
+    told.read_line(&mut ready).unwrap();
+    assert!(ready.contains("\"ready\""), "{ready}");
+    signal("-USR1");
+    let said = BufReader::new(daemon.stderr.take().unwrap()).lines().map_while(Result::ok);
+    assert!(said.into_iter().any(|line| line == "no jobs"));
+    signal("-TERM");
+    assert_eq!(daemon.wait().unwrap().code(), Some(143));
+}

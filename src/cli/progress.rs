@@ -91,7 +91,7 @@ impl Progress {
             Event::Start { frames, folder, .. } => {
                 self.folder.clone_from(folder);
                 self.frames = *frames;
-                stop::keep_state([0, 0, *frames]);
+                self.keep_state();
                 if let Some(bar) = &self.bar {
                     bar.set_length(*frames as u64);
                 }
@@ -130,7 +130,7 @@ impl Progress {
                 ms(frame.ms.write),
             ));
         }
-        stop::keep_state([self.ended, self.failed, self.frames]);
+        self.keep_state();
         let percent = 100.0 * self.ended.min(self.frames) as f64 / self.frames.max(1) as f64;
         match self.kind {
             ProgressKind::Openjd => println!("openjd_progress: {percent:.1}"),
@@ -158,6 +158,12 @@ impl Progress {
                 self.ended, self.frames
             ));
         }
+    }
+
+    /// For whoever asks how far the run is.
+    fn keep_state(&self) {
+        let Self { frames, ended, failed, .. } = self;
+        stop::keep_state(format!("{ended} of {frames} frames have ended, {failed} failed"));
     }
 
     /// Prints a line above the bar.

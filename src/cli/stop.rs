@@ -3,7 +3,7 @@
 use crate::device::Stop;
 use anyhow::{Context, Result};
 use std::sync::atomic::{AtomicUsize, Ordering};
-use std::sync::{Arc, OnceLock};
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 /// Asked by signals.
 #[derive(Clone)]
@@ -22,14 +22,12 @@ impl OnSignals {
 
 static LISTENING: OnceLock<OnSignals> = OnceLock::new();
 
-/// How far the run is: frames that ended, those of them that failed, all.
-static STATE: [AtomicUsize; 3] = [const { AtomicUsize::new(0) }; 3];
+/// How far it is, in words.
+static STATE: Mutex<String> = Mutex::new(String::new());
 
-/// Keeps how far the run is, for whoever asks by SIGUSR1.
-pub(super) fn keep_state(frames: [usize; 3]) {
-    for (state, now) in STATE.iter().zip(frames) {
-        state.store(now, Ordering::Relaxed);
-    }
+/// Keeps how far it is, for whoever asks by SIGUSR1.
+pub(super) fn keep_state(words: String) {
+    *STATE.lock().unwrap_or_else(PoisonError::into_inner) = words;
 }
 
 /// Listens before anything else is done, where a daemon is started: whoever started it may stop it at once.
@@ -59,8 +57,7 @@ fn listen() -> Result<OnSignals> {
     std::thread::spawn(move || {
         for s in signals.forever() {
             if s == SIGUSR1 {
-                let [ended, failed, all] = [0, 1, 2].map(|i| STATE[i].load(Ordering::Relaxed));
-                eprintln!("{ended} of {all} frames have ended, {failed} failed");
+                eprintln!("{}", STATE.lock().unwrap_or_else(PoisonError::into_inner));
                 continue;
             }
             if asked.asked() {

@@ -9,6 +9,7 @@ use crate::run::Event;
 use crate::watch::{self, Notices, State, WatchEvent, WatchOptions};
 use anyhow::{Result, bail};
 use clap::Args;
+use std::collections::HashMap;
 use std::net::SocketAddr;
 use std::process::ExitCode;
 use std::time::Duration;
@@ -96,7 +97,13 @@ pub(super) fn watch(args: &WatchArgs, global: &Global) -> Result<ExitCode> {
             smtp,
         },
     };
+    let mut counts = Counts::default();
+    stop::keep_state(counts.words());
     let ended = watch::watch(&options, fleet, &stop.asked, &mut |event| {
+        if let WatchEvent::State(status) = event {
+            counts.count(&status.job, status.state);
+            stop::keep_state(counts.words());
+        }
         if global.json {
             println!("{}", as_json(event));
         } else {
@@ -110,6 +117,34 @@ pub(super) fn watch(args: &WatchArgs, global: &Global) -> Result<ExitCode> {
     } else {
         ExitCode::SUCCESS
     })
+}
+
+/// Jobs by their states: those that have not ended by name, the others counted.
+#[derive(Default)]
+struct Counts {
+    open: HashMap<String, State>,
+    ended: [u64; State::ALL.len()],
+}
+
+impl Counts {
+    fn count(&mut self, job: &str, state: State) {
+        if state.is_end() {
+            self.open.remove(job);
+            self.ended[state as usize] += 1;
+        } else {
+            self.open.insert(job.to_owned(), state);
+        }
+    }
+
+    fn words(&self) -> String {
+        let count = |state: State| {
+            self.ended[state as usize] + self.open.values().filter(|s| **s == state).count() as u64
+        };
+        let counts = State::ALL.map(|state| (count(state), state.word()));
+        let words: Vec<String> =
+            counts.iter().filter(|(n, _)| *n > 0).map(|(n, word)| format!("{n} {word}")).collect();
+        if words.is_empty() { "no jobs".to_owned() } else { words.join(", ") }
+    }
 }
 
 /// For people: a line for each state that matters, and for each frame that failed.

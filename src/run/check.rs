@@ -64,6 +64,26 @@ fn real(path: &Path) -> Option<PathBuf> {
     path.canonicalize().ok()
 }
 
+/// Frames that no device took, for whatever reason: success is never claimed for what is not there.
+pub(super) fn left_over(
+    job: &Job,
+    report: &Report,
+    blank: impl Fn(usize) -> Box<FrameReport>,
+) -> Vec<Box<FrameReport>> {
+    let mut has_ended = vec![false; job.pictures.len()];
+    for (index, _) in &report.ended {
+        has_ended[*index as usize] = true;
+    }
+    let left = (0..has_ended.len()).filter(|&index| !has_ended[index]);
+    let failed = |index| {
+        let mut frame = blank(index);
+        frame.error = Some(format!("{}: no device took the frame; render it again", frame.source));
+        frame.device_failed = true;
+        frame
+    };
+    left.map(failed).collect()
+}
+
 /// Turns frames whose pictures are not there any more into failed ones and returns them. `blank` gives the report of one
 /// that is not kept.
 pub(super) fn pictures_gone(

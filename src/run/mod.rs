@@ -229,6 +229,10 @@ pub fn render(
         tell(&notes, &mut warnings, &mut report, on_event);
     }
     if !stop.asked() {
+        for left in check::left_over(job, &report, |index| reader.blank(index)) {
+            report.frame(&left);
+            on_event(&Event::Frame(left));
+        }
         for gone in check::pictures_gone(job, &mut report, |index| reader.blank(index)) {
             on_event(&Event::Frame(Box::new(gone)));
         }
