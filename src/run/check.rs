@@ -69,14 +69,14 @@ pub(super) fn left_over(
     job: &Job,
     report: &Report,
     blank: impl Fn(usize) -> Box<FrameReport>,
-) -> Vec<Box<FrameReport>> {
+) -> Vec<FrameReport> {
     let mut has_ended = vec![false; job.pictures.len()];
     for (index, _) in &report.ended {
         has_ended[*index as usize] = true;
     }
     let left = (0..has_ended.len()).filter(|&index| !has_ended[index]);
     let failed = |index| {
-        let mut frame = blank(index);
+        let mut frame = *blank(index);
         frame.error = Some(format!("{}: no device took the frame; render it again", frame.source));
         frame.device_failed = true;
         frame

@@ -231,7 +231,7 @@ pub fn render(
     if !stop.asked() {
         for left in check::left_over(job, &report, |index| reader.blank(index)) {
             report.frame(&left);
-            on_event(&Event::Frame(left));
+            on_event(&Event::Frame(Box::new(left)));
         }
         for gone in check::pictures_gone(job, &mut report, |index| reader.blank(index)) {
             on_event(&Event::Frame(Box::new(gone)));
