@@ -23,17 +23,26 @@ pub use mitsuba::Mitsuba;
 pub use table::{Cell, Table};
 pub use times::Spread;
 
+use crate::device::Stop;
+use crate::device::cpu::CpuDevice;
 use crate::device::registry::RegistryError;
 use crate::job::{self, Job, JobError, Options, Request};
 use crate::math::Vec3;
 use crate::output::{OutputError, write_atomic};
-use crate::run::{RunError, machine};
+use crate::run::{self, Fleet, Outcome, RunError, RunOptions, machine};
+use crate::schedule::Policy;
 use std::fs::create_dir_all;
 use std::io;
 use std::path::{Path, PathBuf};
 use tempfile::TempDir;
 use timeline::Timeline;
 use view::View;
+
+/// Renders a job on a device that nobody else has.
+fn rendered(job: &Job, options: &RunOptions, device: CpuDevice) -> Result<Outcome, RunError> {
+    let fleet = Fleet::new(vec![Box::new(device)], Policy::default());
+    run::render(job, options, &fleet, &Stop::default(), &mut |_| {})
+}
 
 /// What is asked for.
 #[derive(Clone, Debug)]

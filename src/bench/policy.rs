@@ -3,11 +3,10 @@
 use super::chart::{Chart, Line, Panel};
 use super::table::{Cell, Table};
 use super::times::Spread;
-use super::{Bench, BenchError};
-use crate::device::Stop;
+use super::{Bench, BenchError, rendered};
 use crate::device::cpu::CpuDevice;
 use crate::plan::Update;
-use crate::run::{self, FrameReport, RunOptions};
+use crate::run::{FrameReport, RunOptions};
 use std::path::PathBuf;
 
 const UPDATES: [(&str, Update); 3] =
@@ -87,14 +86,7 @@ fn render(bench: &Bench, input: &Input, update: Update) -> Result<Vec<FrameRepor
         keeps_reports: true,
         ..RunOptions::default()
     };
-    let outcome = run::render(
-        &job,
-        &options,
-        &run::Fleet::new(vec![Box::new(device)], crate::schedule::Policy::default()),
-        &Stop::default(),
-        &mut |_| {},
-    )?;
-    Ok(outcome.report.frames)
+    Ok(rendered(&job, &options, device)?.report.frames)
 }
 
 /// Cost ratio and time by frame, for each way.

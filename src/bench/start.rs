@@ -3,10 +3,9 @@
 use super::table::{Cell, Table};
 use super::times::Spread;
 use super::view::View;
-use super::{Bench, BenchError};
-use crate::device::Stop;
+use super::{Bench, BenchError, rendered};
 use crate::device::cpu::CpuDevice;
-use crate::run::{self, RunOptions};
+use crate::run::RunOptions;
 use crate::store::{DEFAULT_LIMIT_BYTES, Store};
 use std::path::Path;
 use std::sync::Arc;
@@ -39,13 +38,7 @@ fn start_ms(bench: &Bench, file: &Path, view: &View, store: Option<Arc<Store>>) 
         CpuDevice::new(threads, u64::MAX).map_err(|_| BenchError::NoThreads)?.with_store(store.clone());
     let options =
         RunOptions { threads, overwrite: true, keeps_reports: true, store, ..RunOptions::default() };
-    let outcome = run::render(
-        &job,
-        &options,
-        &run::Fleet::new(vec![Box::new(device)], crate::schedule::Policy::default()),
-        &Stop::default(),
-        &mut |_| {},
-    )?;
+    let outcome = rendered(&job, &options, device)?;
     let ms = outcome.report.frames.first().map(|f| f.ms).unwrap_or_default();
     Ok([ms.read, ms.parse, ms.diff, ms.upload, ms.update].into_iter().flatten().sum())
 }

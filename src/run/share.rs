@@ -140,9 +140,10 @@ impl<'a> Share<'a> {
             if stop.asked() || state.scheduler.is_done(self.job) {
                 break;
             }
-            let turn = state.next(self.job, self.hub.clock.s(), self.ahead);
-            // a lease may be another run's
-            self.hub.changed.notify_all();
+            let (turn, others) = state.next(self.job, self.hub.clock.s(), self.ahead);
+            if others {
+                self.hub.changed.notify_all();
+            }
             if turn.is_some() {
                 return turn;
             }
@@ -286,25 +287,29 @@ impl State {
         feed.given - feed.left >= AHEAD_LEAST && self.runs.iter().map(on_their_way).sum::<f64>() > AHEAD_S
     }
 
-    /// The next frame of a run, for the device that has the fewest ahead of it.
-    fn next(&mut self, job: JobId, now_s: f64, ahead: u64) -> Option<Turn> {
+    /// The next frame of a run, for the device that has the fewest ahead of it; and whether others were leased to other runs,
+    /// whose readers must hear of it. Readers that find nothing wake nobody: they would wake each other without end.
+    fn next(&mut self, job: JobId, now_s: f64, ahead: u64) -> (Option<Turn>, bool) {
+        let mut others = false;
         let mut hungry: Vec<usize> = (0..self.feeds.len()).collect();
         hungry.retain(|&d| !self.is_fed(d, ahead));
         hungry.sort_by_key(|&d| self.feeds[d].given - self.feeds[d].taken);
         for device in hungry {
             if self.feeds[device].lease.is_none() {
                 self.feeds[device].lease = self.scheduler.lease(now_s, device);
+                others |= self.feeds[device].lease.as_ref().is_some_and(|lease| lease.job != job);
             }
             let feed = &mut self.feeds[device];
             let Some(lease) = feed.lease.as_mut().filter(|lease| lease.job == job) else { continue };
             let Some(frame) = lease.frames.next() else { continue };
             feed.lease.take_if(|lease| lease.frames.is_empty());
             feed.given += 1;
-            let [given, ..] = &mut self.runs.get_mut(&job)?.turns[device];
+            let Some(run) = self.runs.get_mut(&job) else { break };
+            let [given, ..] = &mut run.turns[device];
             *given += 1;
-            return Some(Turn { device, index: frame as usize, place: *given - 1 });
+            return (Some(Turn { device, index: frame as usize, place: *given - 1 }), others);
         }
-        None
+        (None, others)
     }
 }
 
@@ -373,6 +378,18 @@ mod tests {
     }
 
     #[test]
+    fn only_what_is_leased_to_another_run_wakes_its_readers() {
+        let hub = hub(1);
+        let (one, other) = (share(&hub, 10, 1, u64::MAX), share(&hub, 10, 1, u64::MAX));
+        let next = |share: &Share| hub.lock().next(share.job, hub.clock.s(), 1);
+        let (mine, wakes) = next(&one);
+        assert!(mine.is_some() != wakes, "the device's first frames are of one of them");
+        let waits = if wakes { &one } else { &other };
+        // the device has enough ahead of it, or its lease is the other's: nothing that anybody must hear of
+        assert_eq!((next(waits), next(waits)), ((None, false), (None, false)));
+    }
+
+    #[test]
     fn the_frame_whose_turn_it_is_is_never_held_up() {
         let (hub, stop) = (hub(1), Stop::default());
         let share = share(&hub, 4, 2, 100);
@@ -406,7 +423,7 @@ mod tests {
         let mut before = 0;
         let mut done = 0;
         while done < 5 {
-            let next = hub.lock().next(short.job, hub.clock.s(), 3);
+            let (next, _) = hub.lock().next(short.job, hub.clock.s(), 3);
             if let Some(turn) = next {
                 short.taken(0);
                 short.done(0, turn.index, 0.01);

@@ -218,7 +218,8 @@ impl DeviceStage<'_> {
         let Some(mut first) = self.under_way.pop_front() else { return };
         let busy = Stopwatch::start();
         // it was begun, so the device is here
-        let Some(held) = &mut self.held else { return };
+        let shared = self.shared;
+        let held = self.held.get_or_insert_with(|| shared.take());
         let traced = caught("tracing", || held.device.finish());
         self.told.busy_s += busy.s();
         self.tell_holds();

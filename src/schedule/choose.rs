@@ -122,7 +122,7 @@ impl Scheduler {
     /// Whether a device helps a job: where others serve it, by the end test and the join test.
     fn helps(&self, now_s: f64, device: usize, id: usize, one: &Job, cold_s: f64, price_s: f64) -> bool {
         let own = self.devices[device].serving.filter(|s| s.job.0 == id);
-        if one.helpers == usize::from(own.is_some()) {
+        if one.servers == usize::from(own.is_some()) {
             return true;
         }
         let (warm_s, _) = self.costs(device, id);
@@ -199,7 +199,7 @@ impl Scheduler {
             return Some(Place::Waiting(Key(-one.weight)));
         }
         let key = self.key(one, costs.cold_s);
-        if one.helpers == 0 {
+        if one.servers == 0 {
             return Some(Place::Waiting(key));
         }
         let served = one.served(now_s, None);

@@ -55,7 +55,7 @@ pub(super) struct Job {
     pub(super) alone_s: f64,
     /// What it adds to the seconds of work that are left.
     pub(super) work_s: f64,
-    pub(super) helpers: usize,
+    pub(super) servers: usize,
     /// Frames a second of those who serve it.
     rate: f64,
     /// Of those in a cold start: their rates, and rates times the moments when they are ready.
@@ -89,7 +89,7 @@ impl Job {
             served_s,
             alone_s,
             work_s: 0.0,
-            helpers: 0,
+            servers: 0,
             rate: 0.0,
             cold_rate: 0.0,
             cold_ready: 0.0,
@@ -185,7 +185,7 @@ impl Job {
     }
 
     pub(super) fn joins(&mut self, serving: &Serving) {
-        self.helpers += 1;
+        self.servers += 1;
         self.rate += serving.rate;
         self.slowest_s = self.slowest_s.max(1.0 / serving.rate);
         if let Some(ready_s) = serving.ready_s {
@@ -203,9 +203,9 @@ impl Job {
 
     pub(super) fn leaves(&mut self, mut serving: Serving) {
         self.is_ready(&mut serving);
-        self.helpers -= 1;
+        self.servers -= 1;
         self.rate -= serving.rate;
-        if self.helpers == 0 {
+        if self.servers == 0 {
             // sums of many terms do not drift from one stretch of service into the next
             (self.rate, self.cold_rate, self.cold_ready, self.slowest_s) = (0.0, 0.0, 0.0, 0.0);
         }
