@@ -22,8 +22,9 @@ use rentix::run::{Fleet, RunOptions, render};
 use rentix::scene::{AovSet, Background, Camera, Filter, Frame, Material, Object, Shot};
 use rentix::schedule::Policy;
 use std::collections::BTreeMap;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
+use std::time::Duration;
 
 const BUDGET_BYTES: u64 = 1 << 27;
 
@@ -397,17 +398,22 @@ fn pictures_of_run(input: &Path, out: &Path, device: Box<dyn Device>) -> BTreeMa
     entries.filter(is_picture).map(named).collect()
 }
 
+fn frames_of_two_triangles(room: &Path, frames: u32) -> PathBuf {
+    let input = room.join("in");
+    std::fs::create_dir(&input).unwrap();
+    for frame in 1..=frames {
+        let obj = format!("v -1 0 0\nv {frame} 0 0\nv 0 1 0\nv 0 0 {frame}\nf 1 2 3\nf 1 4 3\n");
+        std::fs::write(input.join(format!("t_{frame}.obj")), obj).unwrap();
+    }
+    input
+}
+
 #[test]
 fn a_run_goes_on_after_its_gpu_was_lost() {
     const FRAMES: u32 = 6;
     for adapter in usable() {
         let t = tempfile::tempdir().unwrap();
-        let input = t.path().join("in");
-        std::fs::create_dir(&input).unwrap();
-        for frame in 1..=FRAMES {
-            let obj = format!("v -1 0 0\nv {frame} 0 0\nv 0 1 0\nv 0 0 {frame}\nf 1 2 3\nf 1 4 3\n");
-            std::fs::write(input.join(format!("t_{frame}.obj")), obj).unwrap();
-        }
+        let input = frames_of_two_triangles(t.path(), FRAMES);
         let run = |out: &str, frames_left| {
             let device = LostOnce { gpu: open(&adapter), frames_left };
             pictures_of_run(&input, &t.path().join(out), Box::new(device))
@@ -418,6 +424,37 @@ fn a_run_goes_on_after_its_gpu_was_lost() {
             let pictures = run(&format!("lost {frames_left}"), Some(frames_left));
             assert!(pictures == right, "{}: lost after {frames_left}", adapter.name());
         }
+    }
+}
+
+/// What hangs gives its frames back, and another device makes the same pictures.
+#[test]
+fn a_gpu_that_hangs_is_given_up() {
+    for adapter in usable() {
+        let frame = &one(scenes::sheet(13, |_| false, |_, p| p));
+        // more than can be done in no time at all
+        let shot = &Shot { size: [512, 512], samples: 16, ..shot_at(1.0) };
+        let mut gpu = open(&adapter.clone().patient(Duration::ZERO));
+        let plan = plan_frame(frame, gpu.residency(), &Wishes::default());
+        let hangs = gpu.apply(&plan, frame).and_then(|_| gpu.trace(frame, shot, &Stop::default())).err();
+        let says = |error: &DeviceError| error.to_string().contains("it hangs: nothing came of 0 s");
+        assert!(hangs.as_ref().is_some_and(says), "{}: {hangs:?}", adapter.name());
+        assert!(gpu.residency().held.is_empty(), "it is left, with what it held");
+
+        let t = tempfile::tempdir().unwrap();
+        let job = resolve(&Request {
+            inputs: vec![frames_of_two_triangles(t.path(), 6)],
+            options: Options { size: Some([512, 512]), samples: Some(16), ..Options::default() },
+            folder: Some(t.path().join("out")),
+            ..Request::default()
+        });
+        let cpu = CpuDevice::new(1, BUDGET_BYTES).expect("a thread can be had");
+        let devices: Vec<Box<dyn Device>> = vec![Box::new(gpu), Box::new(cpu)];
+        let options = RunOptions { threads: 2, keeps_reports: true, ..RunOptions::default() };
+        let fleet = Fleet::new(devices, Policy::default());
+        let outcome = render(&job.unwrap(), &options, &fleet, &Stop::default(), &mut |_| {}).unwrap();
+        assert_eq!(outcome.report.totals.rendered, 6, "{:?}", outcome.report.warnings);
+        assert!(outcome.report.frames.iter().all(|f| f.device.as_deref() == Some("cpu")));
     }
 }
 

@@ -3,6 +3,7 @@
 
 mod chart;
 mod embree;
+mod estimates;
 mod frames;
 mod mitsuba;
 mod policy;
@@ -80,7 +81,7 @@ pub struct Workload {
 }
 
 /// All of them.
-pub const WORKLOADS: [Workload; 2] = [
+pub const WORKLOADS: [Workload; 3] = [
     Workload {
         name: "updates",
         tables: &["reading", "trees", "warm", "start", "policy", "frames", "timeline", "refit", "rays"],
@@ -92,6 +93,12 @@ pub const WORKLOADS: [Workload; 2] = [
         tables: &["makespan", "slowdown", "starts", "affinity", "load", "weights", "decisions"],
         about: "frames to devices, simulated: affinity beside the thesis's policies and others on made traces",
         run: schedule::schedule,
+    },
+    Workload {
+        name: "estimates",
+        tables: &["estimates"],
+        about: "what frames were expected to cost, and what they cost, scene by scene",
+        run: estimates::estimates,
     },
 ];
 

@@ -1,11 +1,15 @@
-//! `rentix inspect`: what is in a sequence and what changes from frame to frame.
+//! `rentix inspect`: what is in a sequence, what changes from frame to frame, and what it will cost.
 
+use super::costs::tell_costs;
+use super::render::{devices, store_of};
 use super::render_args::RenderArgs;
 use super::{EXIT_FAILED, Global, request};
+use crate::device::DeviceInfo;
 use crate::diff::{Change, changes};
 use crate::job::{self, Job, Picture};
-use crate::run::{Sources, read_frame};
+use crate::run::{Sources, forecast, read_frame};
 use crate::scene::Frame;
+use crate::schedule::estimate::Thesis;
 use crate::warning::Warnings;
 use anyhow::Result;
 use std::process::ExitCode;
@@ -16,6 +20,7 @@ struct Seen {
     vertices: u64,
     meshes: usize,
     materials: usize,
+    texture_bytes: u64,
     change: Change,
 }
 
@@ -29,7 +34,11 @@ pub(super) fn inspect(args: &RenderArgs, global: &Global) -> Result<ExitCode> {
     let mut failed = 0;
     let mut before: Option<(usize, Frame)> = None;
     let sources = Sources::default();
-    for picture in &job.pictures {
+    let store = store_of(args);
+    let devices: Vec<DeviceInfo> =
+        devices(args, store.clone())?.iter().map(|device| device.info().clone()).collect();
+    for (i, picture) in job.pictures.iter().enumerate() {
+        let is_last = job.pictures.get(i + 1).is_none_or(|next| next.sequence != picture.sequence);
         match read_frame(&job, picture, &sources, args.lenient, &mut warnings) {
             Err(error) => {
                 failed += 1;
@@ -46,6 +55,11 @@ pub(super) fn inspect(args: &RenderArgs, global: &Global) -> Result<ExitCode> {
                     before.as_ref().is_none_or(|(s, _)| *s != picture.sequence),
                     global,
                 );
+                if is_last {
+                    let costs = forecast(&job, picture, &frame, &seen.change, store.as_deref(), &devices);
+                    let thesis = Thesis::new(seen.vertices, seen.texture_bytes as f64 / 1e6);
+                    tell_costs(&job.sequences[picture.sequence].name, &thesis, &devices, &costs, global.json);
+                }
                 before = Some((picture.sequence, frame));
             }
         }
@@ -69,6 +83,7 @@ fn look(before: Option<&Frame>, frame: &Frame) -> Seen {
         vertices: geometries().map(|g| g.positions.0.len() as u64).sum(),
         meshes: geometries().map(|g| g.meshes.len()).sum(),
         materials: geometries().map(|g| g.materials.len()).sum(),
+        texture_bytes: frame.texture_bytes(),
         change: changes(before, frame),
     }
 }

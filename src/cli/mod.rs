@@ -4,6 +4,7 @@ mod bench;
 mod cache;
 mod compare;
 mod completions;
+mod costs;
 mod devices;
 mod inspect;
 mod progress;
@@ -91,7 +92,7 @@ enum Command {
         after_help = "Example: rentix verify walk/ --size 160x90 --update refit\n\nExit status: 0 equal, 1 they differ; the first frame and pixel that differ are named."
     )]
     Verify(Box<render_args::RenderArgs>),
-    /// Tells what is in a sequence and what changes from frame to frame; renders nothing
+    /// Tells what is in a sequence, what changes from frame to frame and what it will cost; renders nothing
     #[command(after_help = "Example: rentix inspect walk/")]
     Inspect(Box<render_args::RenderArgs>),
     /// Compares two pictures or two folders of pictures

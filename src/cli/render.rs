@@ -4,7 +4,7 @@ use super::progress::{Progress, ProgressKind};
 use super::render_args::RenderArgs;
 use super::store::store;
 use super::{EXIT_FAILED, EXIT_NO_DEVICE, Global, request, stop};
-use crate::device::registry;
+use crate::device::{Device, registry};
 use crate::job::{self, FrameSet, Job};
 use crate::run::{self, Event, Fleet, FrameReport, Outcome, RunOptions, machine};
 use crate::store::Store;
@@ -59,19 +59,24 @@ pub(super) fn run_options(args: &RenderArgs) -> RunOptions {
 }
 
 /// The store asked for.
-fn store_of(args: &RenderArgs) -> Option<Arc<Store>> {
+pub(super) fn store_of(args: &RenderArgs) -> Option<Arc<Store>> {
     if args.no_cache { None } else { store(args.cache.as_deref()) }
 }
 
-/// The devices asked for.
+/// The devices asked for, and how they share.
 pub(super) fn fleet(args: &RenderArgs, options: &RunOptions) -> Result<Fleet> {
+    Ok(Fleet::new(devices(args, options.store.clone())?, args.schedule.into()))
+}
+
+/// The devices asked for.
+pub(super) fn devices(args: &RenderArgs, store: Option<Arc<Store>>) -> Result<Vec<Box<dyn Device>>> {
     let wanted = registry::Wanted {
         threads: threads(args),
         budget_bytes: args.device_memory,
         host_budget_bytes: machine::default_budget_bytes(),
-        store: options.store.clone(),
+        store,
     };
-    Ok(Fleet::new(registry::open_all(args.device.as_deref(), &wanted)?, args.schedule.into()))
+    Ok(registry::open_all(args.device.as_deref(), &wanted)?)
 }
 
 fn threads(args: &RenderArgs) -> usize {

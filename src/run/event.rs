@@ -40,6 +40,10 @@ pub struct ByteCounts {
     pub read: u64,
     /// Handed to what the device holds; None where nothing was traced.
     pub uploaded: Option<u64>,
+    /// What the device held then; None where nothing was traced.
+    pub resident: Option<u64>,
+    /// What it was expected to hold before it was made resident.
+    pub predicted: Option<u64>,
 }
 
 /// Milliseconds of one frame by stage; None for what was not done.
@@ -104,6 +108,8 @@ pub struct FrameReport {
     pub rays: RayReport,
     /// Times.
     pub ms: StageTimes,
+    /// What they were expected to be before.
+    pub predicted_ms: StageTimes,
     /// Where several sequences have the same numbers only their place in the job tells pictures apart.
     #[serde(skip)]
     pub index: usize,

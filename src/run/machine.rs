@@ -34,6 +34,11 @@ pub fn peak_rss_bytes() -> u64 {
     kib_field("/proc/self/status", "VmHWM:")
 }
 
+/// The memory that this process has resident now, in bytes.
+pub fn rss_bytes() -> u64 {
+    kib_field("/proc/self/status", "VmRSS:")
+}
+
 /// What the CPU device may hold unless told otherwise: half of the free memory, 1 GiB where that is not known.
 pub fn default_budget_bytes() -> u64 {
     match available_memory_bytes() {

@@ -8,6 +8,7 @@ mod costs;
 mod estimate;
 pub mod event;
 mod fleet;
+mod forecast;
 pub mod machine;
 mod memory;
 mod prepare;
@@ -21,6 +22,7 @@ mod write;
 
 pub use event::{Event, FrameReport, Status};
 pub use fleet::Fleet;
+pub use forecast::{Forecast, forecast};
 pub use read::read_frame;
 pub use report::{DeviceReport, Report, Totals};
 pub use source::Sources;
@@ -34,6 +36,8 @@ use crate::plan::Update;
 use crate::schedule::ScheduleError;
 use crate::store::Store;
 use crate::warning::Warnings;
+use estimate::Estimator;
+use fleet::Shared;
 use read::ReadFrame;
 use share::Share;
 use std::path::PathBuf;
@@ -154,6 +158,7 @@ pub fn render(
     on_event: &mut dyn FnMut(&Event),
 ) -> Result<Outcome, RunError> {
     let since = Stopwatch::start();
+    let [rss_before, peak_before] = [machine::rss_bytes(), machine::peak_rss_bytes()];
     let records = Records::read(&job.folder)?;
     check::nothing_is_lost(job, &records, options)?;
     clean_up(job);
@@ -168,15 +173,22 @@ pub fn render(
     let prepared = prepare::prepare(job, options);
     tell(&prepared.warnings, &mut warnings, &mut report, on_event);
 
-    let reader = read::Reader::new(job, options, &records, prepared);
+    let store = options.store_of_run();
+    let infos = fleet.devices().iter().map(|device| &device.info);
+    let estimator = Estimator::new(store.as_deref(), infos);
     let log = RunLog::create(&job.folder);
-    let threads = fleet
-        .devices()
-        .iter()
-        .map(|device| stage_threads(options.threads, device.info.kind))
-        .max()
-        .unwrap_or(1);
-    let share = shared(job, options, fleet, threads)?;
+    let devices = fleet.devices();
+    let stage_threads = |device: &Shared| stage_threads(options.threads, device.info.kind);
+    let threads = devices.iter().map(stage_threads).max().unwrap_or(1);
+    // each device has as many frames read ahead as there are readers for it
+    let ahead = (threads.div_ceil(devices.len().max(1)) + FRAMES_READ_AHEAD).max(3);
+    let costs = (0..devices.len()).map(|device| estimator.costs(job, device)).collect();
+    let memory_bytes = options.memory_bytes.unwrap_or(u64::MAX);
+    let share = Share::new(&fleet.hub, job.pictures.len(), options.priority, costs, ahead, memory_bytes)?;
+    let on_their_way = (ahead * devices.len() + threads).min(job.pictures.len());
+    let trees = devices.iter().filter(|device| device.info.kind == DeviceKind::Cpu).count();
+    let at_once = [on_their_way, trees].map(|n| n as u64);
+    let reader = read::Reader::new(job, options, &records, prepared, &estimator, at_once);
     let mut saved = report::Saver::new(options.report.clone());
 
     std::thread::scope(|scope| {
@@ -191,17 +203,20 @@ pub fn render(
             scope.spawn(move || read::read_stage(reader, share, stop, &to_devices, &note));
         }
         drop(to_devices);
-        for (place, (device, from_readers)) in fleet.devices().iter().zip(from_readers).enumerate() {
-            let (note, to_writers, share) = (note.clone(), to_writers.clone(), &share);
+        for (place, (device, from_readers)) in devices.iter().zip(from_readers).enumerate() {
+            let (note, to_writers) = (note.clone(), to_writers.clone());
+            let (share, estimator) = (&share, &estimator);
             scope.spawn(move || {
-                let ends = Ends { device: place, share, stop, to_writers: &to_writers, note: &note };
+                let ends =
+                    Ends { device: place, share, estimator, stop, to_writers: &to_writers, note: &note };
                 trace::device_stage(device, options, &from_readers, ends);
             });
         }
         drop(to_writers);
         for _ in 0..threads {
-            let (log, from_device, note) = (&log, Arc::clone(&from_device), note.clone());
-            scope.spawn(move || write::write_stage(log, &from_device, &note));
+            let (log, estimator) = (&log, &estimator);
+            let (from_device, note) = (Arc::clone(&from_device), note.clone());
+            scope.spawn(move || write::write_stage(log, estimator, &from_device, &note));
         }
         drop(from_device);
         drop(note);
@@ -217,12 +232,20 @@ pub fn render(
                 Note::Warnings(w) => tell(&w, &mut warnings, &mut report, on_event),
                 Note::Device(i, d) => report.devices[i] = d,
             }
+            if report.totals.predicted_rss_bytes.is_none() {
+                report.totals.predicted_rss_bytes = estimator.host_bytes().map(|bytes| rss_before + bytes);
+            }
             // what cannot be written now is tried again, and told of at the end
             let _ = saved.save(&mut report, &since, false);
         }
     });
 
-    if let Some(store) = options.store_of_run() {
+    let peak_bytes = machine::peak_rss_bytes();
+    if peak_bytes > peak_before {
+        estimator.took(peak_bytes.saturating_sub(rss_before));
+    }
+    if let Some(store) = store {
+        estimator.save(&store);
         store.collect_garbage();
         let mut notes = Warnings::default();
         store.take_notes().into_iter().for_each(|note| notes.add(None, None, note));
@@ -241,20 +264,6 @@ pub fn render(
     report.settle(&since);
     let stopped = stop.asked();
     saved.save(&mut report, &since, true).map_err(RunError::Report).map(|()| Outcome { report, stopped })
-}
-
-/// The frames of a job, shared out over devices of which each has as many read ahead as there are readers for it.
-fn shared<'a>(
-    job: &Job,
-    options: &RunOptions,
-    fleet: &'a Fleet,
-    readers: usize,
-) -> Result<Share<'a>, RunError> {
-    let devices = fleet.devices();
-    let costs = devices.iter().map(|device| estimate::estimate(job, &device.info)).collect();
-    let ahead = (readers.div_ceil(devices.len().max(1)) + FRAMES_READ_AHEAD).max(3);
-    let memory_bytes = options.memory_bytes.unwrap_or(u64::MAX);
-    Ok(Share::new(&fleet.hub, job.pictures.len(), options.priority, costs, ahead, memory_bytes)?)
 }
 
 /// What a caught panic says, for the error of its frame.

@@ -1,8 +1,9 @@
 //! The reader stage: files become a frame and a shot, and finished pictures are recognised before they are traced.
 
 use super::animation::{self, Views};
+use super::estimate::Estimator;
 use super::event::{ByteCounts, FrameReport, StageTimes, Status, UpdateReport};
-use super::memory::{expected_bytes, needed_bytes, refusal};
+use super::memory::{expected_bytes, needed_bytes, reckoned_bytes, refusal};
 use super::prepare::Prepared;
 use super::share::{Share, Turn};
 use super::source::{Place, Sources};
@@ -51,6 +52,9 @@ pub(super) struct Reader<'a> {
     options: &'a RunOptions,
     records: &'a Records,
     prepared: Prepared,
+    estimator: &'a Estimator,
+    /// Frames on their way at once, and devices that have their trees in the host's memory.
+    at_once: [u64; 2],
     /// The last picture that shows a file.
     last_shown: HashMap<&'a Path, usize>,
     /// The first picture of each sequence.
@@ -87,13 +91,15 @@ impl<'a> Reader<'a> {
         options: &'a RunOptions,
         records: &'a Records,
         prepared: Prepared,
+        estimator: &'a Estimator,
+        at_once: [u64; 2],
     ) -> Self {
         let (mut last_shown, mut first_of) = (HashMap::new(), HashMap::new());
         for (index, picture) in job.pictures.iter().enumerate() {
             last_shown.extend(files(job, picture).map(|(_, path)| (path, index)));
             first_of.entry(picture.sequence).or_insert(index);
         }
-        Self { job, options, records, prepared, last_shown, first_of }
+        Self { job, options, records, prepared, estimator, at_once, last_shown, first_of }
     }
 
     /// Which objects of a picture stand in files that later pictures show, too.
@@ -122,12 +128,12 @@ impl<'a> Reader<'a> {
         let is_first = self.first_of.get(&picture.sequence) == Some(&index);
         let RunOptions { lenient, strict, .. } = *self.options;
         let loaded = load_frame(self.job, picture, is_first, sources, lenient, strict, warnings);
-        let (frame, views, sources) = match loaded {
+        let (frame, views, sources, is_posed) = match loaded {
             Ok(loaded) => {
                 report.bytes.read = loaded.bytes_read;
                 report.ms.read = Some(loaded.read_ms);
                 report.ms.parse = Some(loaded.parse_ms);
-                (loaded.frame, loaded.views, loaded.sources)
+                (loaded.frame, loaded.views, loaded.sources, loaded.is_posed)
             }
             Err(error) => {
                 report.device_failed = matches!(error, LoadError::TooLarge(_));
@@ -136,6 +142,9 @@ impl<'a> Reader<'a> {
             }
         };
         report.triangles = frame.triangles();
+        self.estimator.read(&mut report, is_posed);
+        let [on_their_way, trees] = self.at_once;
+        self.estimator.reckon_host(|| reckoned_bytes(self.job, picture, &frame, on_their_way, trees));
         self.refuse_beyond_memory(&mut report, needed_bytes(&frame))?;
         let shot = match self.prepared.shot(picture, &views) {
             Ok(shot) => shot,
@@ -195,6 +204,7 @@ impl<'a> Reader<'a> {
             bytes: ByteCounts::default(),
             rays: super::event::RayReport::default(),
             ms: StageTimes::default(),
+            predicted_ms: StageTimes::default(),
             index,
             device_failed: false,
         })
@@ -213,6 +223,8 @@ struct LoadedFrame {
     /// For each object the place of its source in the picture.
     sources: Vec<usize>,
     views: Views,
+    /// Whether what stands in it was parsed before and posed now.
+    is_posed: bool,
     bytes_read: u64,
     read_ms: f64,
     parse_ms: f64,
@@ -267,6 +279,7 @@ fn load_frame(
         frame: Frame::default(),
         sources: Vec::new(),
         views: Views::default(),
+        is_posed: false,
         bytes_read: 0,
         read_ms: 0.0,
         parse_ms: 0.0,
@@ -285,6 +298,7 @@ fn load_frame(
             if strict && let Some(missing) = shown.gltf.missing.first() {
                 return Err(LoadError::Bad(format!("{missing}; the frame is not rendered (--strict)")));
             }
+            all.is_posed = true;
             all.parse_ms += shown.parse_ms;
             all.views.cameras.extend(shown.views.cameras);
             all.views.lights.extend(shown.views.lights);

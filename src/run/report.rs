@@ -25,6 +25,8 @@ pub struct Totals {
     pub frames_per_s: f64,
     /// The most memory ever resident, bytes.
     pub peak_rss_bytes: u64,
+    /// What that was expected to be when the first frame was read.
+    pub predicted_rss_bytes: Option<u64>,
 }
 
 impl Totals {
@@ -143,7 +145,7 @@ impl Report {
     /// Brings counts, times and memory up to now.
     pub fn settle(&mut self, since: &Stopwatch) {
         self.wall_s = since.s();
-        self.totals = Totals::default();
+        self.totals = Totals { predicted_rss_bytes: self.totals.predicted_rss_bytes, ..Totals::default() };
         for (_, status) in &self.ended {
             self.totals.count(*status);
         }

@@ -221,6 +221,23 @@ impl<'a> Share<'a> {
         })
     }
 
+    /// A frame takes more bytes than a device may hold: whether another takes it, and from now on all frames of its run.
+    pub(super) fn too_large(&self, device: usize, index: usize, bytes: u64) -> bool {
+        let now_s = self.hub.clock.s();
+        self.change(|s, run| {
+            if !s.scheduler.needs(now_s, self.job, bytes) {
+                return false;
+            }
+            s.leaves(run, device);
+            let frame = index as u64;
+            s.scheduler.give_back(now_s, device, self.job, frame..frame + 1, false);
+            if let Some(lease) = s.feeds[device].lease.take_if(|lease| lease.job == self.job) {
+                s.scheduler.give_back(now_s, device, self.job, lease.frames, false);
+            }
+            true
+        })
+    }
+
     /// A frame comes back untraced.
     pub(super) fn gave_back(&self, device: usize, index: usize) {
         let now_s = self.hub.clock.s();

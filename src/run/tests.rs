@@ -74,6 +74,31 @@ fn a_panic_and_a_lack_of_memory_fail_their_own_frames() {
     assert_eq!((again.report.totals.rendered, again.report.totals.resumed), (2, 4));
 }
 
+/// Frames whose device may hold them all, beside two that may hold one triangle and no more.
+#[test]
+fn what_a_device_cannot_hold_goes_to_one_that_can() {
+    let t = tempfile::tempdir().unwrap();
+    let job = resolve(&sequence(t.path())).unwrap();
+    let fleet = |budgets: &[u64]| {
+        let fake = |(i, &bytes): (usize, &u64)| {
+            Box::new(FakeDevice::new(&format!("fake:{i}"), bytes)) as Box<dyn Device>
+        };
+        Fleet::new(budgets.iter().enumerate().map(fake).collect(), Policy::default())
+    };
+    let outcome =
+        render(&job, &two_threads(), &fleet(&[10, 20, 1 << 20]), &Stop::default(), &mut |_| {}).unwrap();
+    assert_eq!(outcome.report.totals.rendered, FRAMES as u64);
+    assert!(outcome.report.frames.iter().all(|f| f.device.as_deref() == Some("fake:2")));
+    // what fits none is refused with the figures
+    let options = RunOptions { overwrite: true, ..two_threads() };
+    let outcome = render(&job, &options, &fleet(&[10, 20]), &Stop::default(), &mut |_| {}).unwrap();
+    let errors: Vec<_> = outcome.failed().filter_map(|f| f.error.clone()).collect();
+    assert_eq!(errors.len(), FRAMES);
+    assert!(
+        errors.iter().all(|e| e.contains("bytes, 20 are allowed") || e.contains("bytes, 10 are allowed"))
+    );
+}
+
 #[test]
 fn a_lost_device_fails_what_comes_after_it() {
     let t = tempfile::tempdir().unwrap();

@@ -1,6 +1,7 @@
 //! The device stage: what changed, what the device must do, trace.
 
 use super::costs::Learned;
+use super::estimate::{DeviceWork, Estimator, Rays};
 use super::event::{Status, UpdateReport};
 use super::fleet::{Held, Shared};
 use super::read::{Read, ReadFrame};
@@ -92,6 +93,7 @@ pub(super) struct Ends<'a> {
     /// The device, by its place among those of the run.
     pub(super) device: usize,
     pub(super) share: &'a Share<'a>,
+    pub(super) estimator: &'a Estimator,
     pub(super) stop: &'a Stop,
     pub(super) to_writers: &'a SyncSender<Shown>,
     pub(super) note: &'a Sender<Note>,
@@ -127,6 +129,7 @@ struct UnderWay {
     read: ReadFrame,
     /// Bytes of the host's memory, until it has left this stage.
     bytes: u64,
+    work: DeviceWork,
     cost: UpdateCost,
     /// When it was begun, s.
     begun_s: f64,
@@ -191,14 +194,20 @@ impl DeviceStage<'_> {
         self.told.busy_s += busy.s();
         self.tell_holds();
         match begun {
-            Ok(cost) => {
+            Ok((work, cost)) => {
                 let (frame, fingerprint) = (Arc::clone(&read.frame), read.fingerprint);
                 self.before = Some(Before { frame, fingerprint, film: None });
                 self.forget(false);
-                self.under_way.push_back(UnderWay { read, bytes, cost, begun_s });
+                self.under_way.push_back(UnderWay { read, bytes, work, cost, begun_s });
             }
             Err(failure) => {
-                let frame = UnderWay { read, bytes, cost: UpdateCost::default(), begun_s };
+                let frame = UnderWay {
+                    read,
+                    bytes,
+                    work: DeviceWork::default(),
+                    cost: UpdateCost::default(),
+                    begun_s,
+                };
                 if may_retry && failure.is_lost() {
                     let mut lost = std::mem::take(&mut self.under_way);
                     lost.push_back(frame);
@@ -271,6 +280,12 @@ impl DeviceStage<'_> {
             share.gave_back(device, index);
             return self.tell();
         }
+        if let Failure::Device(DeviceError::OutOfMemory { needed_bytes, budget_bytes, .. }) = &failure
+            && needed_bytes > budget_bytes
+            && share.too_large(device, index, *needed_bytes)
+        {
+            return self.tell();
+        }
         self.losses = if failure.is_lost() { self.losses + 1 } else { 0 };
         let is_tried_again = share.failed(device, index);
         if self.losses >= LOSSES && !share.is_gone(device) && share.gone(device) {
@@ -329,7 +344,7 @@ impl DeviceStage<'_> {
         let _ = self.ends.note.send(Note::Device(self.ends.device, self.told.clone()));
     }
 
-    fn update_and_begin(&mut self, read: &mut ReadFrame) -> Result<UpdateCost, DeviceError> {
+    fn update_and_begin(&mut self, read: &mut ReadFrame) -> Result<(DeviceWork, UpdateCost), DeviceError> {
         let Some(held) = &mut self.held else { return Err(DeviceError::Stopped) };
         let Held { device, forget } = &mut **held;
         let report = &mut read.report;
@@ -346,13 +361,19 @@ impl DeviceStage<'_> {
             costs: self.learned.costs(self.ends.share.left()),
         };
         let plan = plan_frame(&read.frame, device.residency(), &wishes);
+        let work = DeviceWork::new(&plan, &read.frame, Rays::of_shot(&read.shot));
+        let Ends { estimator, device: place, .. } = self.ends;
+        estimator.begins(place, &work, report);
+        report.bytes.predicted = Some(estimator.resident_bytes(place, &plan, device.residency()));
         let cost = device.apply(&plan, &read.frame)?;
+        estimator.built(place, &plan, device.residency());
+        report.bytes.resident = Some(device.residency().bytes());
         report.updated(&plan, &cost);
         let exposure_stops = read.encoding.exposure_stops;
         let output =
             if read.encoding.takes_codes() { Output::Codes { exposure_stops } } else { Output::Linear };
         device.begin(&read.frame, &read.shot, output, self.ends.stop)?;
-        Ok(cost)
+        Ok((work, cost))
     }
 
     /// Tells what a frame took: from its begin, or from the end of the one before, to its own.
@@ -372,7 +393,7 @@ impl DeviceStage<'_> {
 
     /// Learns from a frame that was traced, and reports it.
     fn learn(&mut self, frame: &mut UnderWay, traced: &Traced) {
-        let UnderWay { read, cost, .. } = frame;
+        let UnderWay { read, work, cost, .. } = frame;
         let report = &mut read.report;
         if let Some(ms) = traced.update_ms {
             report.ms.update = Some(cost.update_ms.unwrap_or(0.0) + ms);
@@ -381,6 +402,7 @@ impl DeviceStage<'_> {
             }
         }
         self.learned.frame(cost, traced.trace_ms);
+        self.ends.estimator.traced(self.ends.device, work, cost, traced);
         if traced.rays.media_ignored > 0 {
             let text =
                 format!("rays entered more than {MEDIA_MAX} media one in another; deeper ones are ignored");

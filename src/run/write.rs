@@ -1,5 +1,6 @@
 //! The writer stage: films become files, each whole or absent, its record before it.
 
+use super::estimate::Estimator;
 use super::event::Status;
 use super::{Note, Shown, panic_text};
 use crate::clock::Stopwatch;
@@ -9,7 +10,12 @@ use std::sync::mpsc::{Receiver, Sender};
 use std::sync::{Mutex, PoisonError};
 
 /// Encodes and writes until no film comes any more.
-pub(super) fn write_stage(log: &RunLog, films: &Mutex<Receiver<Shown>>, note: &Sender<Note>) {
+pub(super) fn write_stage(
+    log: &RunLog,
+    estimator: &Estimator,
+    films: &Mutex<Receiver<Shown>>,
+    note: &Sender<Note>,
+) {
     loop {
         let shown = films.lock().unwrap_or_else(PoisonError::into_inner).recv();
         let Ok(mut shown) = shown else { return };
@@ -21,6 +27,8 @@ pub(super) fn write_stage(log: &RunLog, films: &Mutex<Receiver<Shown>>, note: &S
         };
         shown.read.report.status = if error.is_some() { Status::Failed } else { shown.status };
         shown.read.report.error = error;
+        let [width, height] = shown.read.shot.size.map(u64::from);
+        estimator.written(&mut shown.read.report, shown.read.encoding.format.word(), width * height);
         let _ = note.send(Note::Frame(shown.read.report));
     }
 }

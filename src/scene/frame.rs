@@ -3,6 +3,7 @@
 use super::geometry::Geometry;
 use super::part::{PartHash, PartHasher};
 use crate::math::DAffine3;
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 /// One layer's geometry in a frame (or one glTF node's).
@@ -26,6 +27,13 @@ impl Frame {
     /// Triangles in all.
     pub fn triangles(&self) -> u64 {
         self.objects.iter().map(|o| o.geometry.triangles.0.len() as u64).sum()
+    }
+
+    /// Bytes of all textures, each once.
+    pub fn texture_bytes(&self) -> u64 {
+        let textures = self.objects.iter().flat_map(|o| o.geometry.textures());
+        let textures: BTreeMap<_, _> = textures.map(|texture| (texture.hash(), texture.bytes())).collect();
+        textures.values().sum()
     }
 
     /// A name for the whole: geometries and transforms in order.

@@ -6,6 +6,7 @@
 
 mod choose;
 mod device;
+pub mod estimate;
 mod job;
 mod order;
 mod ranges;

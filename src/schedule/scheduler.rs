@@ -1,7 +1,7 @@
 //! Jobs and devices, and the events that change them.
 
 use super::device::{Device, Serving};
-use super::job::{Failed, Job, weight};
+use super::job::{Estimate, Failed, Job, weight};
 use super::order::Key;
 use super::rules::{Weights, alone_s, run_length};
 use super::{DeviceFacts, JobId, Lease, NewJob, Policy, ScheduleError};
@@ -149,6 +149,24 @@ impl Scheduler {
             one.learns_cold(facts.kind, usual_s.clamp(0.0, 1e6), START_GAIN);
         }
         self.place(job.0, now_s);
+    }
+
+    /// A frame of a job takes so many bytes on a device: what may hold fewer is given none of its frames any more. False,
+    /// and nothing else, where no device may hold so many.
+    pub fn needs(&mut self, now_s: f64, job: JobId, bytes: u64) -> bool {
+        let Some(one) = self.jobs.get_mut(job.0).and_then(Option::as_mut) else { return false };
+        let fits = |(estimate, kind): (&Estimate, &Kind)| {
+            estimate.costs.fits && kind.present > 0 && bytes <= kind.budget_bytes
+        };
+        if !one.estimates.iter().zip(&self.kinds).any(fits) {
+            return false;
+        }
+        one.bytes = one.bytes.max(bytes);
+        for (estimate, kind) in one.estimates.iter_mut().zip(&self.kinds) {
+            estimate.costs.fits &= one.bytes <= kind.budget_bytes;
+        }
+        self.place(job.0, now_s);
+        true
     }
 
     /// A job's scene was made resident on a device, or evicted from it.

@@ -1,7 +1,9 @@
 //! Adapters: what there is, what each lacks, and devices of them. The one place that knows what kernels need.
 
 use crate::device::DeviceError;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
+use std::time::Duration;
 
 /// Storage buffers that the kernels bind at once.
 const STORAGE_BUFFERS: u32 = 16;
@@ -14,6 +16,8 @@ const TOP_THREADS: u32 = 512;
 const BINDING_BYTES: u64 = 64 << 20;
 /// Without knowledge of an adapter's memory, this much of it is used.
 const UNKNOWN_MEMORY_BYTES: u64 = 1 << 30;
+/// What is submitted takes about 10 ms; on a machine whose cores are all taken a program that acts as a GPU took seconds.
+const PATIENCE: Duration = Duration::from_mins(1);
 
 /// A GPU, or a program that acts as one.
 #[derive(Clone, Debug)]
@@ -25,6 +29,7 @@ pub struct Adapter {
     memory_bytes: Option<u64>,
     /// Features that are there but not used.
     unused: wgpu::Features,
+    patience: Duration,
 }
 
 /// The adapters of this machine, those that are hardware first.
@@ -43,6 +48,7 @@ pub fn adapters() -> Vec<Adapter> {
         memory_bytes: memory_bytes(&adapter),
         handle: adapter,
         unused: wgpu::Features::empty(),
+        patience: PATIENCE,
     };
     found.into_iter().enumerate().map(adapter).collect()
 }
@@ -142,6 +148,13 @@ impl Adapter {
         self
     }
 
+    /// The same, given up as hung after another time, for tests.
+    #[must_use]
+    pub fn patient(mut self, patience: Duration) -> Self {
+        self.patience = patience;
+        self
+    }
+
     /// Why it cannot be used, where it cannot.
     pub fn lacks(&self) -> Option<String> {
         let limits = self.handle.limits();
@@ -208,6 +221,8 @@ impl Adapter {
             device,
             queue,
             trouble,
+            patience: self.patience,
+            hangs: AtomicBool::new(false),
         })
     }
 }
@@ -232,6 +247,9 @@ pub(super) struct Gpu {
     pub(super) top_threads: u32,
     /// Set from callbacks: a device that is lost answers every call as if nothing were wrong.
     trouble: Arc<Mutex<Option<String>>>,
+    /// What is submitted is done within it, or the device hangs.
+    patience: Duration,
+    hangs: AtomicBool,
 }
 
 impl Gpu {
@@ -247,17 +265,32 @@ impl Gpu {
 
     /// Waits until all that was submitted is done.
     pub(super) fn wait(&self) -> Result<(), DeviceError> {
-        let waited = self.device.poll(wgpu::PollType::wait_indefinitely());
-        self.check()?;
-        waited.map(|_| ()).map_err(|e| DeviceError::Lost { device: self.name.clone(), why: e.to_string() })
+        self.wait_until(None)
     }
 
     /// Waits until a submission is done, and those before it.
     pub(super) fn wait_for(&self, submission: wgpu::SubmissionIndex) -> Result<(), DeviceError> {
-        let poll = wgpu::PollType::Wait { submission_index: Some(submission), timeout: None };
-        let waited = self.device.poll(poll);
+        self.wait_until(Some(submission))
+    }
+
+    fn wait_until(&self, submission_index: Option<wgpu::SubmissionIndex>) -> Result<(), DeviceError> {
+        let waited =
+            self.device.poll(wgpu::PollType::Wait { submission_index, timeout: Some(self.patience) });
         self.check()?;
-        waited.map(|_| ()).map_err(|e| DeviceError::Lost { device: self.name.clone(), why: e.to_string() })
+        let why = match waited {
+            Ok(_) => return Ok(()),
+            Err(wgpu::PollError::Timeout) => {
+                self.hangs.store(true, Ordering::Relaxed);
+                format!("it hangs: nothing came of {} s of waiting", self.patience.as_secs())
+            }
+            Err(error) => error.to_string(),
+        };
+        Err(DeviceError::Lost { device: self.name.clone(), why })
+    }
+
+    /// Whether it did not do in time what was submitted: then it cannot be closed either, for that would wait for it.
+    pub(super) fn hangs(&self) -> bool {
+        self.hangs.load(Ordering::Relaxed)
     }
 
     /// A buffer that kernels bind; `what` lies in it.

@@ -141,7 +141,11 @@ impl GpuDevice {
     /// Forgets a device that is lost: what it held is gone.
     fn settled<T>(&mut self, done: Result<T, DeviceError>) -> Result<T, DeviceError> {
         if matches!(done, Err(DeviceError::Lost { .. })) {
-            self.open = None;
+            match self.open.take() {
+                // it is left as it is: to close it would wait for it
+                Some(open) if open.gpu.hangs() => std::mem::forget(open),
+                open => drop(open),
+            }
         }
         done
     }
