@@ -110,7 +110,8 @@ impl Panel {
         let mut builder = ChartBuilder::on(area);
         builder.margin(12).x_label_area_size(36).y_label_area_size(64);
         let [low, high] = [least.min(greatest) / 1.1, greatest.max(least) * 1.1];
-        let (log_y, y) = ((low.max(1e-9)..high).log_scale(), 0.0..greatest.max(1e-9) * 1.1);
+        let (log_y, y) =
+            ((low.max(1e-9)..high).log_scale(), 0.0..if greatest > 0.0 { greatest * 1.1 } else { 1.0 });
         if self.is_log_x {
             let first = points().map(|p| p.0).fold(last, f64::min).max(1e-9);
             let x = (first..last.max(first * 2.0) * (last / first).max(2.0).powf(more)).log_scale();
@@ -141,7 +142,8 @@ impl Panel {
             .configure_mesh()
             .light_line_style(WHITE.mix(0.0))
             .x_desc(&self.x)
-            .x_label_formatter(&|&x| if x < 1.0 { format!("{x}") } else { format!("{x:.0}") })
+            .x_label_formatter(&|&x| label(x))
+            .y_label_formatter(&|&y| label(y))
             .y_desc(&self.y)
             .label_style((FONT, 13))
             .draw()?;
@@ -165,6 +167,19 @@ impl Panel {
             .label_font((FONT, 13))
             .draw()?;
         Ok(())
+    }
+}
+
+/// A round number, short.
+fn label(x: f64) -> String {
+    let size = x.abs();
+    if size != 0.0 && !(1e-3..1e5).contains(&size) {
+        format!("{x:e}")
+    } else if size >= 10.0 {
+        format!("{x:.0}")
+    } else {
+        // what sums of steps leave behind the third place is no part of it
+        format!("{}", (x * 1e3).round() / 1e3)
     }
 }
 
