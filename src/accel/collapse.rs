@@ -114,7 +114,7 @@ struct Cuts {
 
 impl Cuts {
     /// How many subtrees each child becomes of up to so many; None where it stays one.
-    fn best(&self, most: usize) -> Option<[usize; 2]> {
+    fn best(self, most: usize) -> Option<[usize; 2]> {
         let least = if most == WIDTH { WIDTH } else { 2 };
         (least..=most).rev().find_map(|i| match usize::from(self.first[i - 2]) {
             0 => None,
@@ -144,15 +144,17 @@ fn plan(node: u32, depth: usize, binary: &Binary, leaves: &Leaves, cuts: &mut [C
     } else {
         (first(before), second(after))
     };
-    // what it costs as 2, 3, … 8 subtrees, some of either child
-    let mut split = [0.0; WIDTH - 1];
-    for (i, split) in split.iter_mut().enumerate() {
-        (own.first[i], *split) = (1, first[0] + second[i]);
-        for k in 1..=i {
-            let cost = first[k] + second[i - k];
-            if cost < *split {
-                (own.first[i], *split) = (k as u8 + 1, cost);
-            }
+    // what it costs as 2, 3, … 8 subtrees, some of either child; side by side
+    let mut of_second = [f32::INFINITY; 2 * (WIDTH - 1)];
+    of_second[WIDTH - 1..].copy_from_slice(&second);
+    let mut split = second.map(|cost| first[0] + cost);
+    own.first = [1; WIDTH - 1];
+    for k in 1..WIDTH - 1 {
+        for i in 0..WIDTH - 1 {
+            let cost = first[k] + of_second[WIDTH - 1 + i - k];
+            let is_less = cost < split[i];
+            split[i] = if is_less { cost } else { split[i] };
+            own.first[i] = if is_less { k as u8 + 1 } else { own.first[i] };
         }
     }
     let as_leaf = if n.count as usize <= leaves.most { as_leaf } else { f32::INFINITY };
@@ -182,9 +184,9 @@ impl Subtree {
 }
 
 /// The cuts of an inner node.
-fn cuts_of<'a>(node: u32, binary: &Binary, cuts: &'a [Cuts]) -> &'a Cuts {
+fn cuts_of(node: u32, binary: &Binary, cuts: &[Cuts]) -> Cuts {
     let n = &binary.nodes[node as usize];
-    &cuts[(n.start + binary.nodes[n.child as usize].count) as usize - 1]
+    cuts[(n.start + binary.nodes[n.child as usize].count) as usize - 1]
 }
 
 /// The children of a subtree, in the order of the binary tree.
