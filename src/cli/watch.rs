@@ -54,7 +54,8 @@ pub(super) struct WatchArgs {
 }
 
 /// Whether `watch` takes an option of `render`: not those that one run alone has.
-pub(super) const NOT_TAKEN: [&str; 7] = ["job", "chunk", "report", "progress", "dry_run", "cold", "order"];
+pub(super) const NOT_TAKEN: [&str; 8] =
+    ["job", "chunk", "report", "progress", "dry_run", "cold", "order", "movie"];
 
 /// No job rests longer before it begins, and no command takes longer.
 const SECONDS_MAX: f64 = 86_400.0;
@@ -79,9 +80,10 @@ pub(super) fn watch(args: &WatchArgs, global: &Global) -> Result<ExitCode> {
         || render.dry_run
         || render.cold
         || render.order.is_some()
+        || render.movie.is_some()
         || render.progress != ProgressKind::Auto;
     if asks_for_one_run {
-        bail!("--job, --chunk, --order, --report, --progress, --cold and --dry-run are for `rentix render`");
+        bail!("--job, --chunk, --order, --report, --progress, --movie, --cold and --dry-run are for `rentix render`");
     }
     let settle = seconds("--settle", args.settle.unwrap_or(2.0))?;
     let on_done_within = seconds("--on-done-within", args.on_done_within.unwrap_or(300.0))?;
