@@ -73,7 +73,7 @@ const TRACING: &[&str] = &[
 const NEAR: usize = 2;
 /// Numbers of further entries for which there are kernels: of their own memory threads clear all before they begin, which for
 /// the largest takes as long as a tenth of tracing. The last is enough for all trees.
-pub const FARS: [u32; 5] = [6, 8, 12, 24, 48];
+pub const FARS: [u32; 4] = [6, 12, 24, 48];
 
 /// The least of [`FARS`] for rays through trees of so many levels, below a top level of so many (0: there is none). A ray leaves
 /// one group of children for each level that it goes down; where an object is entered, its siblings and what stands in the
