@@ -2,66 +2,14 @@
 //! (CONTRACT 8). With `--once` each daemon here runs to its own end.
 
 mod common;
-use common::{Run, assert_same, pictures, render, run, wave};
+#[path = "common/watched.rs"]
+mod watched;
+use common::{assert_same, run, wave};
 use serde_json::Value;
-use std::ffi::OsStr;
 use std::fs;
 use std::io::Write;
-use std::path::{Path, PathBuf};
-
-const SMALL: [&str; 2] = ["--size", "64x36"];
-
-struct Watched {
-    t: tempfile::TempDir,
-}
-
-impl Watched {
-    fn new() -> Self {
-        let t = tempfile::tempdir().unwrap();
-        fs::create_dir(t.path().join("inbox")).unwrap();
-        Self { t }
-    }
-
-    fn path(&self, name: &str) -> PathBuf {
-        self.t.path().join(name)
-    }
-
-    fn args(&self, more: &[&str]) -> Vec<std::ffi::OsString> {
-        let (inbox, out) = (self.path("inbox"), self.path("done"));
-        let mut args: Vec<&OsStr> = vec!["watch".as_ref(), inbox.as_ref(), "-o".as_ref(), out.as_ref()];
-        args.extend(["--settle", "0.05", "--once"].map(OsStr::new));
-        args.extend(SMALL.iter().chain(more).map(OsStr::new));
-        args.into_iter().map(OsStr::to_os_string).collect()
-    }
-
-    /// Watches until all that is there has ended.
-    fn once(&self, more: &[&str], status: i32) -> Run {
-        let run = run(self.t.path(), self.args(more));
-        assert_eq!(run.status, status, "{more:?}: {}", run.stderr);
-        run
-    }
-
-    fn job(&self, name: &str, frames: u32) -> PathBuf {
-        wave(&self.path("inbox").join(name), frames, 6, 8)
-    }
-
-    fn status(&self, job: &str) -> Value {
-        serde_json::from_slice(&fs::read(self.path("done").join(job).join("status.json")).unwrap()).unwrap()
-    }
-
-    fn done(&self, job: &str) -> std::collections::BTreeMap<String, Vec<u8>> {
-        let mut files = pictures(&self.path("done").join(job));
-        files.remove("status.json");
-        files
-    }
-
-    /// What `render` makes of a folder.
-    fn wanted(&self, input: &Path, more: &[&str]) -> std::collections::BTreeMap<String, Vec<u8>> {
-        let _ = fs::remove_dir_all(self.path("want"));
-        render(self.t.path(), input, "want", &[&SMALL, more].concat(), 0);
-        pictures(&self.path("want"))
-    }
-}
+use std::path::Path;
+use watched::Watched;
 
 fn tar_of(folder: &Path, target: &Path) {
     let mut tar = tar::Builder::new(fs::File::create(target).unwrap());
@@ -210,19 +158,23 @@ fn cancelled_jobs_are_not_rendered_until_they_are_wanted_again() {
 #[test]
 fn jobs_of_higher_priority_come_first_and_then_the_oldest() {
     let w = Watched::new();
-    for (name, priority) in [("a", -1), ("b", 0), ("c", 7)] {
-        let text = format!("sequence: .\npriority: {priority}\n");
-        fs::write(w.job(name, 1).join("job.yaml"), text).unwrap();
+    let ordered = |name: &str, text: &str| {
+        fs::write(w.job(name, 1).join("job.yaml"), format!("sequence: .\n{text}\n")).unwrap();
+    };
+    // as many as are rendered at a time keep the others waiting until all are looked into
+    for n in 0..16 {
+        ordered(&format!("a{n:02}"), "samples: 150");
     }
+    ordered("b", "priority: -1");
+    ordered("c", "priority: 0");
     w.job("d", 1);
-    let events = w.once(&["--json", "--priority", "3"], 0).stdout;
+    ordered("e", "priority: 7");
+    let events = w.once(&["--json", "--priority", "3", "--device", "cpu"], 0).stdout;
     let events = events.lines().map(|line| serde_json::from_str::<Value>(line).unwrap());
-    let jobs: Vec<String> =
-        events.filter(|e| e["event"] == "start").map(|e| e["job"].as_str().unwrap().to_owned()).collect();
-    assert_eq!(jobs.len(), 4);
-    // the first may begin before the others are looked into
-    let place = |job: &str| jobs.iter().position(|j| j == job).unwrap();
-    assert!(place("b") < place("a") || place("a") == 0, "{jobs:?}");
+    let begun = events.filter(|e| e["event"] == "state" && e["state"] == "running");
+    let jobs: Vec<String> = begun.map(|e| e["job"].as_str().unwrap().to_owned()).collect();
+    let waited: Vec<&String> = jobs.iter().filter(|job| !job.starts_with('a')).collect();
+    assert_eq!(waited, ["e", "d", "c", "b"], "{jobs:?}");
 }
 
 #[test]

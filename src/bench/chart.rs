@@ -4,8 +4,8 @@ use plotters::coord::Shift;
 use plotters::coord::ranged1d::{Ranged, ValueFormatter};
 use plotters::element::PathElement;
 use plotters::prelude::{
-    BLACK, Cartesian2d, ChartBuilder, ChartContext, Color, DrawingArea, IntoDrawingArea, IntoLogRange,
-    LineSeries, RGBColor, SVGBackend, SeriesLabelPosition, WHITE,
+    BLACK, Cartesian2d, ChartBuilder, ChartContext, Circle, Color, DrawingArea, IntoDrawingArea,
+    IntoLogRange, LineSeries, RGBColor, SVGBackend, SeriesLabelPosition, WHITE,
 };
 use std::error::Error;
 
@@ -47,7 +47,7 @@ pub(super) struct Chart {
 const SIZE: (u32, u32) = (900, 620);
 pub(super) const FONT: &str = "sans-serif";
 /// Okabe and Ito's palette, which people with any colour vision can tell apart.
-const COLORS: [RGBColor; 8] = [
+pub(super) const COLORS: [RGBColor; 8] = [
     RGBColor(0, 114, 178),
     RGBColor(230, 159, 0),
     RGBColor(0, 158, 115),
@@ -57,6 +57,8 @@ const COLORS: [RGBColor; 8] = [
     RGBColor(240, 228, 66),
     RGBColor(0, 0, 0),
 ];
+/// Points that are marked each, at most.
+const MARKED: usize = 24;
 /// Widths of lines: where they lie on each other, those below look out.
 const WIDTHS: [u32; 8] = [2, 6, 4, 2, 2, 3, 4, 2];
 
@@ -101,21 +103,25 @@ impl Panel {
         let least = points().map(|p| p.1).fold(f64::INFINITY, f64::min);
         let greatest = points().map(|p| p.1).fold(f64::NEG_INFINITY, f64::max);
         let last = points().map(|p| p.0).fold(1.0, f64::max);
+        // the names stand beside the lines: so much of the width is theirs
+        let longest = self.lines.iter().map(|line| line.name.chars().count()).max().unwrap_or(0);
+        let share = (50.0 + 7.5 * longest as f64) / f64::from(SIZE.0 - 88);
+        let more = share.min(0.6) / (1.0 - share.min(0.6));
         let mut builder = ChartBuilder::on(area);
         builder.margin(12).x_label_area_size(36).y_label_area_size(64);
-        let [low, high] = [least.min(1.0) / 1.1, greatest.max(1.0) * 1.1];
-        let (log_y, y) = ((low.max(1e-9)..high).log_scale(), 0.0..greatest.max(1e-9) * 1.1);
-        // the names stand beside the lines
+        let [low, high] = [least.min(greatest) / 1.1, greatest.max(least) * 1.1];
+        let (log_y, y) =
+            ((low.max(1e-9)..high).log_scale(), 0.0..if greatest > 0.0 { greatest * 1.1 } else { 1.0 });
         if self.is_log_x {
             let first = points().map(|p| p.0).fold(last, f64::min).max(1e-9);
-            let x = (first..last.max(first * 2.0) * (last / first).max(2.0).powf(0.14)).log_scale();
+            let x = (first..last.max(first * 2.0) * (last / first).max(2.0).powf(more)).log_scale();
             if self.is_log {
                 self.lines_on(builder.build_cartesian_2d(x, log_y)?)
             } else {
                 self.lines_on(builder.build_cartesian_2d(x, y)?)
             }
         } else {
-            let x = 1.0..(last.max(2.0) - 1.0) * 1.14 + 1.0;
+            let x = 1.0..(last.max(2.0) - 1.0) * (1.0 + more) + 1.0;
             if self.is_log {
                 self.lines_on(builder.build_cartesian_2d(x, log_y)?)
             } else {
@@ -136,16 +142,20 @@ impl Panel {
             .configure_mesh()
             .light_line_style(WHITE.mix(0.0))
             .x_desc(&self.x)
-            .x_label_formatter(&|&x| if x < 1.0 { format!("{x}") } else { format!("{x:.0}") })
+            .x_label_formatter(&|&x| label(x))
+            .y_label_formatter(&|&y| label(y))
             .y_desc(&self.y)
             .label_style((FONT, 13))
             .draw()?;
         let drawn = (1..self.lines.len()).chain(0..self.lines.len().min(1));
         for i in drawn {
             let style = COLORS[i % COLORS.len()].stroke_width(WIDTHS[i % WIDTHS.len()]);
-            let points = self.lines[i].points.iter().copied();
+            let points = || self.lines[i].points.iter().copied();
+            if self.lines[i].points.len() <= MARKED {
+                chart.draw_series(points().map(|point| Circle::new(point, 3, style.filled())))?;
+            }
             chart
-                .draw_series(LineSeries::new(points, style))?
+                .draw_series(LineSeries::new(points(), style))?
                 .label(&self.lines[i].name)
                 .legend(move |(x, y)| PathElement::new(vec![(x, y), (x + 18, y)], style));
         }
@@ -157,6 +167,19 @@ impl Panel {
             .label_font((FONT, 13))
             .draw()?;
         Ok(())
+    }
+}
+
+/// A round number, short.
+fn label(x: f64) -> String {
+    let size = x.abs();
+    if size != 0.0 && !(1e-3..1e5).contains(&size) {
+        format!("{x:e}")
+    } else if size >= 10.0 {
+        format!("{x:.0}")
+    } else {
+        // what sums of steps leave behind the third place is no part of it
+        format!("{}", (x * 1e3).round() / 1e3)
     }
 }
 

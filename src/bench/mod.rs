@@ -1,15 +1,26 @@
 //! The built-in benchmarks: named workloads, each with tables, charts and JSON. Medians of runs in turn; a peer that is
 //! not installed is absent, never filled in.
 
+mod accuracy;
+mod baseline;
 mod chart;
+mod child;
+mod dots;
 mod embree;
 mod estimates;
 mod frames;
 mod mitsuba;
+mod needs;
+mod pace;
+mod page;
+mod peers;
 mod policy;
 mod reading;
+mod recorded;
+mod scenes;
 mod schedule;
 pub mod sequences;
+mod stability;
 mod start;
 mod table;
 mod timeline;
@@ -18,7 +29,11 @@ mod trees;
 mod updates;
 mod view;
 mod warm;
+mod warm_cold;
 
+pub use baseline::Slower;
+
+use baseline::Baseline;
 use chart::Chart;
 pub use mitsuba::Mitsuba;
 pub use table::{Cell, Table};
@@ -32,11 +47,11 @@ use crate::math::Vec3;
 use crate::output::{OutputError, write_atomic};
 use crate::run::{self, Fleet, Outcome, RunError, RunOptions, machine};
 use crate::schedule::Policy;
+use page::Page;
 use std::fs::create_dir_all;
 use std::io;
 use std::path::{Path, PathBuf};
 use tempfile::TempDir;
-use timeline::Timeline;
 use view::View;
 
 /// Renders a job on a device that nobody else has.
@@ -44,6 +59,9 @@ fn rendered(job: &Job, options: &RunOptions, device: CpuDevice) -> Result<Outcom
     let fleet = Fleet::new(vec![Box::new(device)], Policy::default());
     run::render(job, options, &fleet, &Stop::default(), &mut |_| {})
 }
+
+/// Where the reports of runs stand in the folder of results.
+const REPORTS: &str = "reports";
 
 /// What is asked for.
 #[derive(Clone, Debug)]
@@ -58,6 +76,8 @@ pub struct BenchOptions {
     pub mitsuba: Option<Mitsuba>,
     /// The device of the tables of devices; None: the best there is.
     pub device: Option<String>,
+    /// The folder of a store, where references are kept.
+    pub store: Option<PathBuf>,
     /// Fewer runs, smaller made scenes.
     pub quick: bool,
     /// The tables to make, by name; all where none is named.
@@ -81,7 +101,31 @@ pub struct Workload {
 }
 
 /// All of them.
-pub const WORKLOADS: [Workload; 3] = [
+pub const WORKLOADS: [Workload; 7] = [
+    Workload {
+        name: "warm-cold",
+        tables: &["warm-cold"],
+        about: "a frame when everything is new and when it follows another, beside the thesis",
+        run: warm_cold::warm_cold,
+    },
+    Workload {
+        name: "accuracy",
+        tables: &["accuracy", "defaults"],
+        about: "time against error: samples, filters, depth, pruning; the frontier, and whether the defaults are on it",
+        run: accuracy::accuracy,
+    },
+    Workload {
+        name: "stability",
+        tables: &["stability", "hostile"],
+        about: "scenes moved and scaled, sequences that break refits: wrong hits, acne, what rounding takes",
+        run: stability::stability,
+    },
+    Workload {
+        name: "needs",
+        tables: &["needs"],
+        about: "what a feature costs a scene that does not use it, and one that does",
+        run: needs::needs,
+    },
     Workload {
         name: "updates",
         tables: &["reading", "trees", "warm", "start", "policy", "frames", "timeline", "refit", "rays"],
@@ -89,16 +133,16 @@ pub const WORKLOADS: [Workload; 3] = [
         run: updates::updates,
     },
     Workload {
-        name: "schedule",
-        tables: &["makespan", "slowdown", "starts", "affinity", "load", "weights", "decisions"],
-        about: "frames to devices, simulated: affinity beside the thesis's policies and others on made traces",
-        run: schedule::schedule,
-    },
-    Workload {
         name: "estimates",
         tables: &["estimates"],
         about: "what frames were expected to cost, and what they cost, scene by scene",
         run: estimates::estimates,
+    },
+    Workload {
+        name: "schedule",
+        tables: &["makespan", "slowdown", "starts", "affinity", "load", "weights", "decisions"],
+        about: "frames to devices, simulated: affinity beside the thesis's policies and others on made traces",
+        run: schedule::schedule,
     },
 ];
 
@@ -132,6 +176,9 @@ pub enum BenchError {
     /// The system gives no threads.
     #[error("the system gives no threads; fewer may be asked for by --threads")]
     NoThreads,
+    /// An earlier result cannot be compared with.
+    #[error("{0}: {1}; --baseline takes the NAME.json of an earlier run of a workload")]
+    Baseline(String, String),
     /// A chart cannot be drawn.
     #[error("a chart cannot be drawn: {0}")]
     Chart(String),
@@ -144,14 +191,23 @@ pub enum BenchError {
 #[derive(Debug, Default)]
 struct Findings {
     tables: Vec<Table>,
-    charts: Vec<Chart>,
-    timelines: Vec<Timeline>,
+    /// Charts as SVG by their names.
+    charts: Vec<(String, String)>,
 }
 
 impl Findings {
     fn add(&mut self, table: Table, on_event: &mut dyn FnMut(&Event<'_>)) {
         on_event(&Event::Table(&table));
         self.tables.push(table);
+    }
+
+    fn draw(&mut self, chart: &Chart) -> Result<(), BenchError> {
+        self.drawn(chart.name.clone(), chart.svg())
+    }
+
+    fn drawn(&mut self, name: String, svg: Result<String, String>) -> Result<(), BenchError> {
+        self.charts.push((name, svg.map_err(BenchError::Chart)?));
+        Ok(())
     }
 }
 
@@ -196,30 +252,49 @@ impl Bench {
     }
 }
 
-/// Runs workloads and writes what they found: `NAME.json` and charts.
+/// Runs workloads and writes what they found: `NAME.json`, charts, and a page with all of it. Gives what is slower than in an
+/// earlier `NAME.json`, where one is given.
 pub fn bench(
     workloads: &[Workload],
     options: BenchOptions,
+    baseline: Option<&Path>,
     on_event: &mut dyn FnMut(&Event<'_>),
-) -> Result<(), BenchError> {
+) -> Result<Vec<Slower>, BenchError> {
+    let before = baseline.map(Baseline::read).transpose()?;
     let bench = Bench { options, room: tempfile::tempdir()? };
     // told before the work, not after it
     create_dir_all(&bench.options.folder)?;
+    let peers = peers::installed(bench.options.embree.as_deref());
+    let mut page = Page::new(&bench, &peers);
+    let mut slower = Vec::new();
+    let mut is_compared = false;
     for workload in workloads {
+        let pace = [pace::pace_ms(bench.options.threads)];
         let found = (workload.run)(&bench, on_event)?;
+        let pace_ms = pace.into_iter().chain([pace::pace_ms(bench.options.threads)]).sum::<f64>() / 2.0;
         let folder = &bench.options.folder;
         let json = serde_json::json!({
             "rentix": env!("CARGO_PKG_VERSION"), "workload": workload.name, "machine": machine::machine(),
-            "quick": bench.options.quick, "threads": bench.options.threads, "tables": found.tables,
+            "quick": bench.options.quick, "threads": bench.options.threads, "pace_ms": pace_ms,
+            "peers": peers, "tables": found.tables,
         });
+        if let Some(before) = before.as_ref().filter(|before| before.is_of(workload.name)) {
+            is_compared = true;
+            slower.extend(before.slower(&json));
+        }
         let json = serde_json::to_vec_pretty(&json).unwrap_or_default();
         write_atomic(&folder.join(format!("{}.json", workload.name)), &json)?;
-        let charts = found.charts.iter().map(|chart| (&chart.name, chart.svg()));
-        let timelines = found.timelines.iter().map(|timeline| (&timeline.name, timeline.svg()));
-        for (name, svg) in charts.chain(timelines) {
-            let svg = svg.map_err(BenchError::Chart)?;
+        for (name, svg) in &found.charts {
             write_atomic(&folder.join(format!("{name}.svg")), svg.as_bytes())?;
         }
+        page.add(workload, &found);
     }
-    Ok(())
+    if let Some(path) = baseline.filter(|_| !is_compared) {
+        return Err(BenchError::Baseline(
+            path.display().to_string(),
+            "it is of a workload that was not run".to_string(),
+        ));
+    }
+    write_atomic(&bench.options.folder.join("report.html"), page.html(&slower).as_bytes())?;
+    Ok(slower)
 }

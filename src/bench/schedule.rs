@@ -1,9 +1,10 @@
-//! The workload `schedule`: rules that share frames out, simulated on made traces. Nothing is timed but decisions; the rest
+//! The workload `schedule`: rules that share frames out, simulated on made traces, and on those that the workload `estimates`
+//! left in the same folder. Nothing is timed but decisions; the rest
 //! is the same on every machine.
 
 use super::chart::{Chart, Line, Panel};
 use super::table::{Cell, Table};
-use super::{Bench, BenchError, Event, Findings};
+use super::{Bench, BenchError, Event, Findings, REPORTS, recorded};
 use crate::clock::Stopwatch;
 use crate::schedule::simulation::{Contender, Family, Outcome, Trace, load, simulate};
 use crate::schedule::{Costs, DeviceFacts, NewJob, Policy, Scheduler, Weights};
@@ -21,13 +22,12 @@ const PHIS: [f64; 9] = [0.0, 0.125, 0.25, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0];
 const PRICES: [f64; 7] = [0.5, 1.0, 2.0, 4.0, 8.0, 32.0, 1024.0];
 
 /// Runs it.
-#[allow(clippy::unnecessary_wraps, reason = "a workload may fail")]
 pub(super) fn schedule(bench: &Bench, on_event: &mut dyn FnMut(&Event<'_>)) -> Result<Findings, BenchError> {
     let mut findings = Findings::default();
     let seeds = bench.rounds(SEEDS) as u64;
     if ["makespan", "slowdown", "starts", "affinity"].iter().any(|table| bench.wants(table)) {
         on_event(&Event::Stage("families of traces"));
-        for table in families(seeds) {
+        for table in families(bench, seeds) {
             if bench.wants(table.name) {
                 findings.add(table, on_event);
             }
@@ -36,13 +36,13 @@ pub(super) fn schedule(bench: &Bench, on_event: &mut dyn FnMut(&Event<'_>)) -> R
     if bench.wants("load") {
         on_event(&Event::Stage("makespan over load"));
         findings.add(sizes(bench), on_event);
-        findings.charts.push(over_load(seeds.min(8)));
+        findings.draw(&over_load(seeds.min(8)))?;
     }
     if bench.wants("weights") {
         on_event(&Event::Stage("weights"));
         let (table, chart) = weights(seeds.min(16));
         findings.add(table, on_event);
-        findings.charts.push(chart);
+        findings.draw(&chart)?;
     }
     if bench.wants("decisions") {
         on_event(&Event::Stage("decisions"));
@@ -77,7 +77,7 @@ fn slowdown_95(outcome: &Outcome) -> f64 {
 }
 
 /// A row for each family, a column for each rule.
-fn families(seeds: u64) -> [Table; 4] {
+fn families(bench: &Bench, seeds: u64) -> [Table; 4] {
     let names = Contender::all().map(Contender::name);
     let columns: Vec<&str> = names.iter().copied().chain(["affinity/best other"]).collect();
     let mut makespans = Table::new(
@@ -114,8 +114,13 @@ fn families(seeds: u64) -> [Table; 4] {
         "Affinity: makespan over the bound (mean, worst trace), slowdown and latency (mean, 95th, 99th percentile), cold starts for each job and as a share of busy time, Jain's index of speed beside alone, the longest wait for a first frame, scenes evicted that were needed again, devices over budget, the share of deadlines missed.",
         &columns,
     );
-    for family in Family::ALL {
-        let traces: Vec<Trace> = (0..seeds).map(|seed| family.trace(seed)).collect();
+    let made = |family: Family| (family.name(), (0..seeds).map(|seed| family.trace(seed)).collect());
+    let mut all: Vec<(&str, Vec<Trace>)> = Family::ALL.into_iter().map(made).collect();
+    let recorded = recorded::traces(&bench.options.folder.join(REPORTS), seeds as usize);
+    if !recorded.is_empty() {
+        all.push(("recorded", recorded));
+    }
+    for (name, traces) in all {
         let means = Contender::all().map(|contender| Means::of(&traces, contender));
         let row = |of: fn(&Outcome) -> f64| means.each_ref().map(|m| m.mean(of));
         let beside = |values: [f64; 8]| {
@@ -123,9 +128,9 @@ fn families(seeds: u64) -> [Table; 4] {
             let best = others.into_iter().fold(f64::INFINITY, f64::min);
             values.into_iter().chain([own / best]).map(Cell::from).collect::<Vec<_>>()
         };
-        makespans.rows.push((family.name().to_string(), beside(row(makespan))));
-        slowdowns.rows.push((family.name().to_string(), beside(row(slowdown_95))));
-        starts.row(family.name(), row(|o| o.cold_starts).map(Cell::from));
+        makespans.rows.push((name.to_string(), beside(row(makespan))));
+        slowdowns.rows.push((name.to_string(), beside(row(slowdown_95))));
+        starts.row(name, row(|o| o.cold_starts).map(Cell::from));
         let [.., own] = &means;
         let cells = [
             own.mean(makespan),
@@ -145,7 +150,7 @@ fn families(seeds: u64) -> [Table; 4] {
             own.greatest(|o| o.over_budget),
             own.mean(|o| o.missed),
         ];
-        affinity.row(family.name(), cells.map(Cell::from));
+        affinity.row(name, cells.map(Cell::from));
     }
     [makespans, slowdowns, starts, affinity]
 }

@@ -66,6 +66,9 @@ pub struct Hostile {
     text: fn(&Sheet, u32) -> String,
 }
 
+/// The one that is made where any moving scene will do.
+pub(super) const TWIST: Hostile = HOSTILE[3];
+
 /// All of them.
 pub const HOSTILE: [Hostile; 11] = [
     Hostile { name: "random places", keeps_its_faces: true, text: random_places },

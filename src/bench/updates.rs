@@ -86,7 +86,9 @@ pub(super) fn updates(bench: &Bench, on_event: &mut dyn FnMut(&Event<'_>)) -> Re
         inputs.extend(waves.into_iter().chain(sequences(bench)).map(input(false)));
         let (table, charts) = policy(bench, &inputs)?;
         findings.add(table, on_event);
-        findings.charts.extend(charts);
+        for chart in &charts {
+            findings.draw(chart)?;
+        }
     }
     Ok(findings)
 }
@@ -114,7 +116,7 @@ fn devices(
         on_event(&Event::Stage("frames over time"));
         if let Some((table, chart)) = timeline(bench, &mut *device)? {
             findings.add(table, on_event);
-            findings.timelines.push(chart);
+            findings.drawn(chart.name.clone(), chart.svg())?;
         }
     }
     if bench.wants("refit") {

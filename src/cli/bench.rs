@@ -1,6 +1,7 @@
 //! `rentix bench`.
 
-use super::Global;
+use super::store::store;
+use super::{EXIT_FAILED, Global};
 use crate::bench::{self, BenchOptions, Event, Mitsuba, WORKLOADS, Workload};
 use crate::run::machine;
 use anyhow::Result;
@@ -40,6 +41,9 @@ pub(super) struct BenchArgs {
     /// The device of the tables frames, refit and rays [default: the best there is]
     #[arg(long, value_name = "NAME")]
     device: Option<String>,
+    /// NAME.json of an earlier run: what is slower now is named, and the exit status is 1
+    #[arg(long, value_name = "FILE")]
+    baseline: Option<PathBuf>,
     /// Threads [default: all cores]
     #[arg(long, value_name = "N")]
     threads: Option<NonZeroUsize>,
@@ -55,13 +59,14 @@ pub(super) fn bench(args: &BenchArgs, global: &Global) -> Result<ExitCode> {
         mitsuba: (args.mitsuba.clone().or_else(|| set("RENTIX_MITSUBA")))
             .map(|script| Mitsuba { script, variant: args.mitsuba_variant.clone() }),
         device: args.device.clone(),
+        store: store(None).map(|store| store.root().to_path_buf()),
         quick: args.quick,
         only: args.only.clone(),
         threads: args.threads.map_or_else(|| machine::machine().cores, usize::from),
     };
     let is_asked = |w: &Workload| args.names.is_empty() || args.names.iter().any(|name| name == w.name);
     let workloads: Vec<Workload> = WORKLOADS.into_iter().filter(is_asked).collect();
-    bench::bench(&workloads, options, &mut |event| match event {
+    let slower = bench::bench(&workloads, options, args.baseline.as_deref(), &mut |event| match event {
         Event::Stage(what) if !(global.quiet || global.json) => eprintln!("{what} ..."),
         Event::Stage(_) => {}
         Event::Table(table) if global.json => {
@@ -69,5 +74,8 @@ pub(super) fn bench(args: &BenchArgs, global: &Global) -> Result<ExitCode> {
         }
         Event::Table(table) => println!("{table}"),
     })?;
-    Ok(ExitCode::SUCCESS)
+    for one in &slower {
+        eprintln!("{one}");
+    }
+    Ok(if slower.is_empty() { ExitCode::SUCCESS } else { ExitCode::from(EXIT_FAILED) })
 }

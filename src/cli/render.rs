@@ -6,7 +6,9 @@ use super::store::store;
 use super::{EXIT_FAILED, EXIT_NO_DEVICE, Global, request, stop};
 use crate::device::{Device, registry};
 use crate::job::{self, FrameSet, Job};
-use crate::run::{self, Event, Fleet, FrameReport, Outcome, RunOptions, machine};
+use crate::run::{
+    self, Event, Fleet, FrameReport, Outcome, RunOptions, machine, make_movie, movie_can_be_made,
+};
 use crate::store::Store;
 use anyhow::Result;
 use std::fmt::Write as _;
@@ -26,6 +28,10 @@ pub(super) fn render(args: &RenderArgs, global: &Global) -> Result<ExitCode> {
     let for_people = matches!(args.progress, ProgressKind::Auto | ProgressKind::Bar | ProgressKind::Plain);
     let kind = if json || global.quiet && for_people { ProgressKind::None } else { args.progress };
     let mut progress = Progress::new(kind, global.verbose);
+    if args.movie.is_some() {
+        // told before the work, not after it
+        movie_can_be_made()?;
+    }
     let stop = stop::on_signals()?;
     let outcome = run::render(&job, &options, &fleet, &stop.asked, &mut |event| {
         if json {
@@ -38,8 +44,22 @@ pub(super) fn render(args: &RenderArgs, global: &Global) -> Result<ExitCode> {
     if json {
         println!("{}", end_json(&outcome));
     }
-    Ok(conclude(&job, &outcome, global, &stop))
+    let status = conclude(&job, &outcome, global, &stop);
+    match &args.movie {
+        Some(file) if !outcome.stopped && outcome.failed().next().is_none() => {
+            make_movie(&job, file, args.fps.unwrap_or(FPS))?;
+            if !global.quiet && !global.json {
+                eprintln!("{}", file.display());
+            }
+        }
+        Some(file) => eprintln!("{}: no film is made, for frames are missing", file.display()),
+        None => {}
+    }
+    Ok(status)
 }
+
+/// Frames a second of a film, as of animations.
+const FPS: f64 = 24.0;
 
 /// What of the options bears on the run itself.
 pub(super) fn run_options(args: &RenderArgs) -> RunOptions {

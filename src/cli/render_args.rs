@@ -85,6 +85,10 @@ pub(super) struct RenderArgs {
     #[arg(long, help_heading = "Output")]
     pub overwrite: bool,
 
+    /// Make a film of the pictures, by ffmpeg (.mp4, .webm, .gif …)
+    #[arg(long, value_name = "FILE", help_heading = "Output")]
+    pub movie: Option<PathBuf>,
+
     /// Job file (YAML); as INPUT or here
     #[arg(long, value_name = "FILE", help_heading = "What to render")]
     pub job: Option<PathBuf>,
@@ -100,7 +104,7 @@ pub(super) struct RenderArgs {
     /// All files in natural order of names are one sequence, numbered from 1
     #[arg(long, help_heading = "What to render")]
     pub one_sequence: bool,
-    /// Frames a second of glTF animations [default: 24]
+    /// Frames a second of glTF animations and films [default: 24]
     #[arg(long, value_name = "N", help_heading = "What to render")]
     pub fps: Option<f64>,
     /// Clip of glTF animations, or all [default: all where no two animate the same, else the first]

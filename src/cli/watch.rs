@@ -36,9 +36,12 @@ pub(super) struct WatchArgs {
     /// Serve a status page (also /metrics for Prometheus, /healthz), as 127.0.0.1:8080
     #[arg(long, value_name = "ADDRESS", help_heading = "Watching")]
     pub listen: Option<SocketAddr>,
-    /// Run a command for each job that finished or failed (RENTIX_JOB, RENTIX_STATE, RENTIX_FOLDER, RENTIX_FRAMES, RENTIX_FAILED, RENTIX_ERROR; its status on stdin)
+    /// Run a command for each job that finished or failed, at least once, one at a time (RENTIX_JOB, RENTIX_STATE, RENTIX_FOLDER, RENTIX_FRAMES, RENTIX_FAILED, RENTIX_ERROR; its status on stdin)
     #[arg(long, value_name = "CMD", help_heading = "Watching")]
     pub on_done: Option<String>,
+    /// Kill that command, and all that it started, after so many seconds [default: 300]
+    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true, help_heading = "Watching")]
+    pub on_done_within: Option<f64>,
     /// Post the status of each job that finished or failed, as JSON
     #[arg(long, value_name = "URL", help_heading = "Watching")]
     pub webhook: Option<String>,
@@ -51,10 +54,18 @@ pub(super) struct WatchArgs {
 }
 
 /// Whether `watch` takes an option of `render`: not those that one run alone has.
-pub(super) const NOT_TAKEN: [&str; 7] = ["job", "chunk", "report", "progress", "dry_run", "cold", "order"];
+pub(super) const NOT_TAKEN: [&str; 8] =
+    ["job", "chunk", "report", "progress", "dry_run", "cold", "order", "movie"];
 
-/// No job rests longer before it begins.
-const SETTLE_MAX_S: f64 = 86_400.0;
+/// No job rests longer before it begins, and no command takes longer.
+const SECONDS_MAX: f64 = 86_400.0;
+
+fn seconds(option: &str, given: f64) -> Result<Duration> {
+    if !(0.0..=SECONDS_MAX).contains(&given) {
+        bail!("{option}: {given} is out of range: allowed from 0 to {SECONDS_MAX}");
+    }
+    Ok(Duration::from_secs_f64(given))
+}
 
 /// Watches a folder and renders what is put into it.
 pub(super) fn watch(args: &WatchArgs, global: &Global) -> Result<ExitCode> {
@@ -69,21 +80,20 @@ pub(super) fn watch(args: &WatchArgs, global: &Global) -> Result<ExitCode> {
         || render.dry_run
         || render.cold
         || render.order.is_some()
+        || render.movie.is_some()
         || render.progress != ProgressKind::Auto;
     if asks_for_one_run {
-        bail!("--job, --chunk, --order, --report, --progress, --cold and --dry-run are for `rentix render`");
+        bail!("--job, --chunk, --order, --report, --progress, --movie, --cold and --dry-run are for `rentix render`");
     }
-    let settle_s = args.settle.unwrap_or(2.0);
-    if !(0.0..=SETTLE_MAX_S).contains(&settle_s) {
-        bail!("--settle: {settle_s} is out of range: allowed from 0 to {SETTLE_MAX_S}");
-    }
+    let settle = seconds("--settle", args.settle.unwrap_or(2.0))?;
+    let on_done_within = seconds("--on-done-within", args.on_done_within.unwrap_or(300.0))?;
     let run = run_options(render);
     let fleet = fleet(render, &run)?;
     let smtp = args.smtp.clone().or_else(|| std::env::var("RENTIX_SMTP").ok().filter(|url| !url.is_empty()));
     let options = WatchOptions {
         inbox: inbox.clone(),
         out: render.output.clone().unwrap_or_else(|| "out".into()),
-        settle: Duration::from_secs_f64(settle_s),
+        settle,
         follow: args.follow,
         once: args.once,
         priority: args.priority.unwrap_or(0),
@@ -92,6 +102,7 @@ pub(super) fn watch(args: &WatchArgs, global: &Global) -> Result<ExitCode> {
         listen: args.listen,
         notices: Notices {
             on_done: args.on_done.clone(),
+            on_done_within,
             webhook: args.webhook.clone(),
             mail: args.mail.clone(),
             smtp,
@@ -119,30 +130,26 @@ pub(super) fn watch(args: &WatchArgs, global: &Global) -> Result<ExitCode> {
     })
 }
 
-/// Jobs by their states: those that have not ended by name, the others counted.
+/// Jobs by their states; of those that have not ended it is known which.
 #[derive(Default)]
 struct Counts {
     open: HashMap<String, State>,
-    ended: [u64; State::ALL.len()],
+    counts: [u64; State::ALL.len()],
 }
 
 impl Counts {
     fn count(&mut self, job: &str, state: State) {
-        if state.is_end() {
-            self.open.remove(job);
-            self.ended[state as usize] += 1;
-        } else {
-            self.open.insert(job.to_owned(), state);
+        let before =
+            if state.is_end() { self.open.remove(job) } else { self.open.insert(job.to_owned(), state) };
+        if let Some(before) = before {
+            self.counts[before as usize] -= 1;
         }
+        self.counts[state as usize] += 1;
     }
 
     fn words(&self) -> String {
-        let count = |state: State| {
-            self.ended[state as usize] + self.open.values().filter(|s| **s == state).count() as u64
-        };
-        let counts = State::ALL.map(|state| (count(state), state.word()));
-        let words: Vec<String> =
-            counts.iter().filter(|(n, _)| *n > 0).map(|(n, word)| format!("{n} {word}")).collect();
+        let counts = State::ALL.iter().zip(self.counts).filter(|(_, n)| *n > 0);
+        let words: Vec<String> = counts.map(|(state, n)| format!("{n} {}", state.word())).collect();
         if words.is_empty() { "no jobs".to_owned() } else { words.join(", ") }
     }
 }

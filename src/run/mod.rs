@@ -11,6 +11,7 @@ mod fleet;
 mod forecast;
 pub mod machine;
 mod memory;
+mod movie;
 mod prepare;
 mod read;
 mod report;
@@ -23,7 +24,8 @@ mod write;
 pub use event::{Event, FrameReport, Status};
 pub use fleet::Fleet;
 pub use forecast::{Forecast, forecast};
-pub use read::read_frame;
+pub use movie::{MovieError, make_movie, movie_can_be_made};
+pub use read::{read_frame, read_shot};
 pub use report::{DeviceReport, Report, Totals};
 pub use source::Sources;
 

@@ -4,7 +4,7 @@ use super::animation::{self, Views};
 use super::estimate::Estimator;
 use super::event::{ByteCounts, FrameReport, StageTimes, Status, UpdateReport};
 use super::memory::{expected_bytes, needed_bytes, reckoned_bytes, refusal};
-use super::prepare::Prepared;
+use super::prepare::{Prepared, prepare};
 use super::share::{Share, Turn};
 use super::source::{Place, Sources};
 use super::{Note, RunOptions, panic_text};
@@ -341,6 +341,16 @@ pub fn read_frame(
     load_frame(job, picture, false, sources, lenient, false, warnings)
         .map(|l| l.frame)
         .map_err(LoadError::text)
+}
+
+/// Reads the frame of a job's first picture, and what it is to be shot with.
+pub fn read_shot(job: &Job, options: &RunOptions) -> Result<(Frame, Shot), String> {
+    let picture = job.pictures.first().ok_or_else(|| "there is no picture".to_string())?;
+    let prepared = prepare(job, options);
+    let (sources, warnings) = (&prepared.sources, &mut Warnings::default());
+    let loaded = load_frame(job, picture, true, sources, options.lenient, options.strict, warnings);
+    let LoadedFrame { frame, views, .. } = loaded.map_err(LoadError::text)?;
+    Ok((frame, prepared.shot(picture, &views)?))
 }
 
 /// Names frames that nothing can be seen of.

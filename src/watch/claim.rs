@@ -41,7 +41,6 @@ pub(super) struct Claim(PathBuf);
 impl Claims {
     /// Those in a folder of their own, which is made.
     pub(super) fn open(folder: &Path, now: Duration) -> Result<Self, WatchError> {
-        fs::create_dir_all(folder).map_err(cannot("made", folder))?;
         let mut claims =
             Self { folder: folder.to_path_buf(), me: own_name("", ""), beaten: None, beats: HashMap::new() };
         claims.beat(now)?;
@@ -54,6 +53,8 @@ impl Claims {
         if self.beaten.is_some_and(|at| now.saturating_sub(at) < BEAT_EVERY) {
             return Ok(());
         }
+        // someone may have removed it
+        fs::create_dir_all(&self.folder).map_err(cannot("made", &self.folder))?;
         let path = self.heart(&self.me);
         let touched = File::options()
             .create(true)

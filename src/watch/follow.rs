@@ -20,6 +20,17 @@ struct Growing {
     ends_whole: Option<bool>,
 }
 
+/// How a file stands.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Look {
+    /// It may still grow.
+    Grows,
+    /// It is whole.
+    Whole,
+    /// It does not end as a whole file does, and has rested so long that nobody seems to go on with it.
+    Rests,
+}
+
 /// The files of a growing sequence.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Frames {
@@ -39,10 +50,10 @@ impl Frames {
         }
     }
 
-    /// Whether a file is whole. `next` says whether the frame after it is there already; `ends_whole` looks whether it
+    /// How a file stands. `next` says whether the frame after it is there already; `ends_whole` looks whether it
     /// ends with a newline and parses to its end, and is asked only when the file has rested long enough for that to
     /// matter.
-    pub(super) fn is_whole(
+    pub(super) fn look(
         &mut self,
         name: &OsStr,
         next: bool,
@@ -50,21 +61,25 @@ impl Frames {
         settle: Duration,
         now: Duration,
         ends_whole: impl FnOnce() -> bool,
-    ) -> bool {
-        let Some(file) = self.files.get_mut(name) else { return false };
+    ) -> Look {
+        let Some(file) = self.files.get_mut(name) else { return Look::Grows };
         if done {
-            return true;
+            return Look::Whole;
         }
         if file.stamp.0 == 0 {
             // writers make a file before they fill it; a frame that stays empty waits for `.done`
-            return false;
+            return Look::Grows;
         }
         let rested = now.saturating_sub(file.since);
         let span = if next { settle / 2 } else { settle };
         if rested < span {
-            return false;
+            return Look::Grows;
         }
-        rested >= span * LONGER || *file.ends_whole.get_or_insert_with(ends_whole)
+        match *file.ends_whole.get_or_insert_with(ends_whole) {
+            true => Look::Whole,
+            false if rested >= span * LONGER => Look::Rests,
+            false => Look::Grows,
+        }
     }
 
     /// What was seen of a file last.
@@ -88,7 +103,7 @@ mod tests {
     }
 
     fn whole(frames: &mut Frames, next: bool, done: bool, now: f64, ends: bool) -> bool {
-        frames.is_whole(OsStr::new("a_1.obj"), next, done, SETTLE, at(now), || ends)
+        frames.look(OsStr::new("a_1.obj"), next, done, SETTLE, at(now), || ends) != Look::Grows
     }
 
     #[test]
@@ -98,7 +113,8 @@ mod tests {
         assert!(!whole(&mut f, false, false, 1.9, true) && whole(&mut f, false, false, 2.0, true));
         f.see(&seen(20), at(2.5));
         assert!(!whole(&mut f, false, false, 4.4, true) && whole(&mut f, false, false, 4.5, true));
-        assert!(!f.is_whole(OsStr::new("a_2.obj"), true, true, SETTLE, at(9e9), || true), "not there");
+        let other = f.look(OsStr::new("a_2.obj"), true, true, SETTLE, at(9e9), || true);
+        assert_eq!(other, Look::Grows, "not there");
     }
 
     #[test]
@@ -109,6 +125,9 @@ mod tests {
         let mut f = Frames::default();
         f.see(&seen(10), at(0.0));
         assert!(!whole(&mut f, false, false, 9.9, false) && whole(&mut f, false, false, 10.0, false));
+        let rests =
+            |f: &mut Frames, ends| f.look(OsStr::new("a_1.obj"), false, false, SETTLE, at(10.0), || ends);
+        assert_eq!(rests(&mut f, false), Look::Rests);
         let mut f = Frames::default();
         f.see(&seen(10), at(0.0));
         assert!(!whole(&mut f, true, false, 4.9, false) && whole(&mut f, true, false, 5.0, false));
@@ -124,13 +143,13 @@ mod tests {
         let mut looks = 0;
         for now in [2.0, 3.0, 4.0] {
             f.see(&seen(10), at(now));
-            f.is_whole(OsStr::new("a_1.obj"), false, false, SETTLE, at(now), || {
+            f.look(OsStr::new("a_1.obj"), false, false, SETTLE, at(now), || {
                 looks += 1;
                 false
             });
         }
         f.see(&seen(11), at(5.0));
-        f.is_whole(OsStr::new("a_1.obj"), false, false, SETTLE, at(7.0), || {
+        f.look(OsStr::new("a_1.obj"), false, false, SETTLE, at(7.0), || {
             looks += 1;
             true
         });

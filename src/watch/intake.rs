@@ -1,4 +1,5 @@
-//! Looks into what arrived, one after the other, beside the thread that drives everything: an archive takes time.
+//! Looks into what arrived, one after the other, beside the thread that drives everything: an archive takes time, for which
+//! folders do not wait.
 
 use super::Message;
 use super::job::{self, Place};
@@ -10,7 +11,8 @@ pub(super) struct Intake(Sender<(u64, String, Place)>);
 
 impl Intake {
     /// Answers go to `messages`.
-    pub(super) fn start(messages: Sender<Message>) -> Self {
+    pub(super) fn start(messages: &Sender<Message>) -> Self {
+        let messages = messages.clone();
         let (jobs, incoming) = channel::<(u64, String, Place)>();
         std::thread::spawn(move || {
             for (id, run, place) in incoming {

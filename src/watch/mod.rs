@@ -130,6 +130,8 @@ enum Message {
     Examined(u64, String, Result<Option<i64>, String>),
     /// What became of an order.
     Told(u64, renderer::Told),
+    /// Somebody was told of a job's end, or that was tried as often as it is.
+    WasTold(Box<Status>),
     /// What could not be told.
     Note(String),
 }

@@ -1,5 +1,5 @@
 //! Tells about jobs that finished or failed: a command, a webhook, mail. One thread, one after the other; what cannot be
-//! told is said and stops nothing.
+//! told is said and stops nothing. Each is told of at least once: what a daemon was killed over, the next one tells again.
 
 use super::state::Status;
 use super::{Message, WatchError};
@@ -7,9 +7,10 @@ use lettre::message::Mailbox;
 use lettre::{SmtpTransport, Transport};
 use std::fmt::Write as _;
 use std::io::Write;
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
-use std::sync::mpsc::{Sender, SyncSender, TrySendError, sync_channel};
+use std::sync::mpsc::{Sender, SyncSender, TrySendError, channel, sync_channel};
 use std::time::Duration;
 
 /// Who is told.
@@ -18,6 +19,8 @@ pub struct Notices {
     /// A command for the shell; it finds `RENTIX_JOB`, `RENTIX_STATE`, `RENTIX_FOLDER`, `RENTIX_FRAMES`, `RENTIX_FAILED`,
     /// `RENTIX_ERROR` in its environment and the status as JSON on its standard input.
     pub on_done: Option<String>,
+    /// How long it may take; then it is killed, and all that it started.
+    pub on_done_within: Duration,
     /// A URL to which the status is posted as JSON.
     pub webhook: Option<String>,
     /// An address to which mail goes.
@@ -26,10 +29,12 @@ pub struct Notices {
     pub smtp: Option<String>,
 }
 
-/// So many notices wait; more are dropped, and that is said.
-const WAITING_MAX: usize = 1_000;
+/// So many notices wait; more are left to the next daemon, and that is said.
+const WAITING_MAX: usize = 10_000;
 /// A webhook has so long for each attempt.
 const WEBHOOK_WITHIN: Duration = Duration::from_secs(20);
+/// What a command finds in its environment of an error is not longer: systems bound it. The whole is on its standard input.
+const ERROR_CHARS_MAX: usize = 4096;
 /// Pauses before each attempt.
 const PAUSES_S: [u64; 3] = [0, 2, 10];
 /// A mail server has so long.
@@ -37,8 +42,7 @@ const MAIL_WITHIN: Duration = Duration::from_mins(1);
 
 /// The thread that tells.
 pub(super) struct Notifier {
-    waiting: Option<SyncSender<(Status, PathBuf)>>,
-    thread: Option<std::thread::JoinHandle<()>>,
+    waiting: SyncSender<(Status, PathBuf)>,
 }
 
 struct Mail {
@@ -63,57 +67,52 @@ impl Notifier {
         }
         let (waiting, incoming) = sync_channel::<(Status, PathBuf)>(WAITING_MAX);
         let notices = notices.clone();
-        let thread = std::thread::spawn(move || {
+        // nobody waits for it: what it is about when the daemon ends is due still
+        std::thread::spawn(move || {
             for (status, folder) in incoming {
-                let note = |what: &str, why: String| {
-                    // nobody listens any more once the daemon ends
-                    let _ = messages.send(Message::Note(format!("{}: {what}: {why}", status.job)));
-                };
-                if let Some(command) = &notices.on_done
-                    && let Err(why) = run(command, &status, &folder)
-                {
-                    note("--on-done", why);
+                let tell = AssertUnwindSafe(|| tell_all(&notices, mail.as_ref(), &status, &folder));
+                let failed = catch_unwind(tell).unwrap_or_else(|_| {
+                    vec!["internal error while it was told of; please report this".to_owned()]
+                });
+                // nobody listens any more once the daemon ends
+                for why in failed {
+                    let _ = messages.send(Message::Note(format!("{}: {why}", status.job)));
                 }
-                if let Some(url) = &notices.webhook
-                    && let Err(why) = post(url, &status)
-                {
-                    note("--webhook", why);
-                }
-                if let Some(mail) = &mail
-                    && let Err(why) = mail.send(&status, &folder)
-                {
-                    note("--mail", why);
-                }
+                let _ = messages.send(Message::WasTold(Box::new(status)));
             }
         });
-        Ok(Some(Self { waiting: Some(waiting), thread: Some(thread) }))
+        Ok(Some(Self { waiting }))
     }
 
-    /// What still waits is not told: the daemon ends at once.
-    pub(super) fn leave(&mut self) {
-        self.waiting = None;
-        self.thread = None;
-    }
-
-    /// Tells of a job that ended; what is said where that cannot be.
+    /// Tells of a job that ended; what is said where that cannot be. A message comes when it was told.
     pub(super) fn tell(&self, status: &Status, folder: &Path) -> Result<(), String> {
-        let waiting = self.waiting.as_ref().ok_or("nobody tells any more")?;
-        waiting.try_send((status.clone(), folder.to_path_buf())).map_err(|error| match error {
+        let why = |error| match error {
             TrySendError::Full(_) => {
-                format!("{}: {WAITING_MAX} notices wait already; nobody is told of it", status.job)
+                format!("{WAITING_MAX} notices wait already; this one waits for the next start")
             }
-            TrySendError::Disconnected(_) => format!("{}: nobody tells any more", status.job),
-        })
+            TrySendError::Disconnected(_) => "nobody tells any more".to_owned(),
+        };
+        let sent = self.waiting.try_send((status.clone(), folder.to_path_buf()));
+        sent.map_err(|error| format!("{}: {}", status.job, why(error)))
     }
 }
 
-impl Drop for Notifier {
-    fn drop(&mut self) {
-        self.waiting = None;
-        if let Some(thread) = self.thread.take() {
-            let _ = thread.join();
-        }
+/// Tells of an end in every way; what failed.
+fn tell_all(notices: &Notices, mail: Option<&Mail>, status: &Status, folder: &Path) -> Vec<String> {
+    let mut failed = Vec::new();
+    let mut note = |what: &str, told: Result<(), String>| {
+        failed.extend(told.err().map(|why| format!("{what}: {why}")));
+    };
+    if let Some(command) = &notices.on_done {
+        note("--on-done", run(command, status, folder, notices.on_done_within));
     }
+    if let Some(url) = &notices.webhook {
+        note("--webhook", post(url, status));
+    }
+    if let Some(mail) = mail {
+        note("--mail", mail.send(status, folder));
+    }
+    failed
 }
 
 #[cfg(unix)]
@@ -121,25 +120,57 @@ const SHELL: [&str; 2] = ["sh", "-c"];
 #[cfg(not(unix))]
 const SHELL: [&str; 2] = ["cmd", "/C"];
 
-fn run(command: &str, status: &Status, folder: &Path) -> Result<(), String> {
-    let mut child = Command::new(SHELL[0])
+fn run(command: &str, status: &Status, folder: &Path, within: Duration) -> Result<(), String> {
+    let mut shell = Command::new(SHELL[0]);
+    // a group of its own, so that what it starts can be ended with it
+    #[cfg(unix)]
+    std::os::unix::process::CommandExt::process_group(&mut shell, 0);
+    let error: String = status.error.iter().flat_map(|e| e.chars()).take(ERROR_CHARS_MAX).collect();
+    let mut child = shell
         .args([SHELL[1], command])
         .env("RENTIX_JOB", &status.job)
         .env("RENTIX_STATE", status.state.word())
         .env("RENTIX_FOLDER", folder)
         .env("RENTIX_FRAMES", status.frames.all.to_string())
         .env("RENTIX_FAILED", status.frames.failed.to_string())
-        .env("RENTIX_ERROR", status.error.as_deref().unwrap_or_default())
+        .env("RENTIX_ERROR", error)
         .stdin(Stdio::piped())
         .stdout(Stdio::null())
         .spawn()
         .map_err(|e| e.to_string())?;
-    if let Some(mut input) = child.stdin.take() {
-        // a command that does not read it is no worse
-        let _ = input.write_all(&serde_json::to_vec(status).unwrap_or_default());
+    let group = child.id();
+    let (ends, end) = channel();
+    let text = serde_json::to_vec(status).unwrap_or_default();
+    std::thread::spawn(move || {
+        if let Some(mut input) = child.stdin.take() {
+            // a command that does not read it is no worse
+            let _ = input.write_all(&text);
+        }
+        let _ = ends.send(child.wait());
+    });
+    match end.recv_timeout(within) {
+        Ok(Ok(ended)) if ended.success() => Ok(()),
+        Ok(Ok(ended)) => Err(format!("`{command}` ended with {ended}")),
+        Ok(Err(error)) => Err(error.to_string()),
+        Err(_) => {
+            kill(group);
+            let s = within.as_secs_f64();
+            Err(format!("`{command}` took more than {s} s and was killed (--on-done-within gives it longer)"))
+        }
     }
-    let ended = child.wait().map_err(|e| e.to_string())?;
-    if ended.success() { Ok(()) } else { Err(format!("`{command}` ended with {ended}")) }
+}
+
+/// Ends a process group, as the shell does it.
+#[cfg(unix)]
+fn kill(group: u32) {
+    // one that has just ended cannot be killed
+    let _ = Command::new("sh").args(["-c", &format!("kill -KILL -{group}")]).stderr(Stdio::null()).status();
+}
+
+/// Ends a process and those that it started.
+#[cfg(not(unix))]
+fn kill(process: u32) {
+    let _ = Command::new("taskkill").args(["/T", "/F", "/PID", &process.to_string()]).status();
 }
 
 fn post(url: &str, status: &Status) -> Result<(), String> {
@@ -200,7 +231,6 @@ mod tests {
     use super::*;
     use std::io::{BufRead, BufReader, Read};
     use std::net::TcpListener;
-    use std::sync::mpsc::channel;
 
     fn status() -> Status {
         Status {
@@ -217,10 +247,31 @@ mod tests {
         let t = tempfile::tempdir().unwrap();
         let out = t.path().join("told");
         let command = format!("(echo $RENTIX_JOB $RENTIX_STATE $RENTIX_ERROR; cat) > {}", out.display());
-        run(&command, &status(), t.path()).unwrap();
+        let run = |command: &str| run(command, &status(), t.path(), Duration::from_mins(1));
+        run(&command).unwrap();
         let told = std::fs::read_to_string(out).unwrap();
         assert!(told.starts_with("walk failed a reason\n{\"job\":\"walk\""), "{told}");
-        assert!(run("exit 3", &status(), t.path()).unwrap_err().contains('3'));
+        assert!(run("exit 3").unwrap_err().contains('3'));
+    }
+
+    #[test]
+    #[cfg(target_os = "linux")]
+    fn a_command_that_does_not_end_is_killed_with_all_that_it_started() {
+        let t = tempfile::tempdir().unwrap();
+        let started = t.path().join("started");
+        // neither it nor what it starts reads what is written to it, which is more than a pipe holds
+        let command = format!("sleep 1000 & echo $! > {}; sleep 1000", started.display());
+        let long = Status { error: Some("x".repeat(1 << 20)), ..status() };
+        let said = run(&command, &long, t.path(), Duration::from_secs(1)).unwrap_err();
+        assert!(said.contains("killed") && said.contains("--on-done-within"), "{said}");
+        let other = std::fs::read_to_string(started).unwrap();
+        let is_running = || {
+            let stat = std::fs::read_to_string(format!("/proc/{}/stat", other.trim())).unwrap_or_default();
+            !stat.is_empty() && !stat.contains(") Z ")
+        };
+        while is_running() {
+            std::thread::yield_now();
+        }
     }
 
     #[test]

@@ -47,6 +47,11 @@ impl Settling {
         &self.seen
     }
 
+    /// When the set will have been equal over the whole span, if nothing in it changes.
+    pub(super) fn settles(&self, span: Duration) -> Option<Duration> {
+        (self.seen.files > 0 && !self.seen.unfinished).then(|| self.since + span)
+    }
+
     /// Whether the set was seen equal over the whole span, or its owner says that it is whole. Nothing is not yet a job.
     pub(super) fn is_settled(&self, span: Duration, now: Duration) -> bool {
         let rested = now.saturating_sub(self.since) >= span;

@@ -135,13 +135,22 @@ impl Status {
         serde_json::from_slice(&bytes).ok()
     }
 
-    /// Replaces the status in a job's folder of pictures.
+    /// Replaces the status in a job's folder of pictures; whoever reads it finds the old one or the new. It is not flushed (3 ms,
+    /// several times a job): one that a power cut spoils is no status, and its job is gone through again, with every picture
+    /// there already.
     pub fn write(&self, folder: &Path) -> Result<(), OutputError> {
-        fs::create_dir_all(folder)
-            .map_err(|source| OutputError::Write { path: folder.to_path_buf(), source })?;
+        let target = path(folder);
+        let temporary = folder.join(output::own_name(".rentix-", ".tmp"));
         let mut bytes = serde_json::to_vec_pretty(self).unwrap_or_default();
         bytes.push(b'\n');
-        output::write_atomic(&path(folder), &bytes)
+        let written = fs::create_dir_all(folder)
+            .and_then(|()| fs::write(&temporary, &bytes))
+            .and_then(|()| fs::rename(&temporary, &target));
+        written.map_err(|source| {
+            // what stays is removed when the job's next run begins
+            let _ = fs::remove_file(&temporary);
+            OutputError::Write { path: target, source }
+        })
     }
 }
 

@@ -150,7 +150,7 @@ impl Resident {
 /// Below so many triangles a tree is built faster than its shape is read.
 const LEAST_STORED: usize = 2048;
 /// Another name for each way in which trees are built or kept.
-const STORED: &str = "tree-1";
+const STORED: &str = "tree-2";
 
 fn stored_or_built(name: PartHash, geometry: &Geometry, store: Option<&Store>) -> Tree {
     let (positions, triangles) = (&geometry.positions.0, &geometry.triangles.0);

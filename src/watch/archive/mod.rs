@@ -139,14 +139,14 @@ pub(super) fn job_file(
 
 fn visit(archive: &Path, packed: Packed, limits: Limits, sink: &mut dyn Sink) -> Result<(), ArchiveError> {
     let broken = |source| ArchiveError::Broken { archive: archive.to_path_buf(), source };
-    let file = File::open(archive).map_err(broken)?;
-    let packed_bytes = file.metadata().map_err(broken)?.len();
+    let open = || File::open(archive).map(BufReader::new).map_err(broken);
+    let file = open()?;
+    let packed_bytes = file.get_ref().metadata().map_err(broken)?.len();
     let most = limits.bytes.min(packed_bytes.saturating_mul(limits.ratio));
     let budget = Budget { left: Cell::new(most), spent: Cell::new(false) };
     let mut visit = Visit { archive, names: Names::new(limits.entries), budget: &budget, limits, sink };
-    let file = BufReader::new(file);
     let visited = match packed {
-        Packed::Zip => zip::visit(file, &mut visit),
+        Packed::Zip => zip::visit(file, open()?, &mut visit),
         Packed::Tar => tar::visit(budget.count(file), &mut visit),
         Packed::TarGz => tar::visit(budget.count(MultiGzDecoder::new(file)), &mut visit),
         Packed::TarZst => {

@@ -33,7 +33,7 @@ impl Names {
     /// Where a folder goes; None for the job's own. An error is what is wrong with the name.
     pub(super) fn folder(&mut self, name: &[u8]) -> Result<Option<PathBuf>, String> {
         let parts = parts(name)?;
-        self.use_folders(&parts)?;
+        self.use_folders(&parts, parts.len())?;
         Ok((!parts.is_empty()).then(|| parts.iter().collect()))
     }
 
@@ -41,7 +41,7 @@ impl Names {
     pub(super) fn file(&mut self, name: &[u8]) -> Result<PathBuf, String> {
         let parts = parts(name)?;
         let Some((_, folders)) = parts.split_last() else { return Err("has no name".to_owned()) };
-        self.use_folders(folders)?;
+        self.use_folders(folders, 0)?;
         let whole = parts.join("/");
         match self.used.insert(whole.to_lowercase(), (whole.clone(), false)) {
             None => Ok(parts.iter().collect()),
@@ -50,9 +50,15 @@ impl Names {
         }
     }
 
-    fn use_folders(&mut self, parts: &[String]) -> Result<(), String> {
+    /// Uses a name's folders, each below the one before. Those that no entry is about count as entries themselves; the one at
+    /// depth `own` is counted already.
+    fn use_folders(&mut self, parts: &[String], own: usize) -> Result<(), String> {
         for depth in 1..=parts.len() {
             let path = parts[..depth].join("/");
+            let is_new = !self.used.contains_key(&path.to_lowercase());
+            if is_new && depth != own && !self.count() {
+                return Err("lies in more folders than are unpacked".to_owned());
+            }
             let (used, is_folder) =
                 self.used.entry(path.to_lowercase()).or_insert_with(|| (path.clone(), true));
             if !*is_folder {

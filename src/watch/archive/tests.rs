@@ -249,6 +249,13 @@ fn what_becomes_too_much_is_refused() {
     assert!(error.contains("more than 2 entries"), "{error}");
     let error = place.unpack(Packed::Tar, &tarred(&three.map(|(n, b)| (n, FILE, "", b))), few).unwrap_err();
     assert!(error.contains("more than 2 entries"), "{error}");
+    // folders count, also where no entry is about them
+    let deep = |names: &[&str]| {
+        let files: Vec<(&str, &[u8])> = names.iter().map(|name| (*name, &b""[..])).collect();
+        place.unpack(Packed::Zip, &zipped(&files), few)
+    };
+    assert!(deep(&["a/b/c"]).unwrap_err().contains("more folders"));
+    assert_eq!(deep(&["a/", "a/b"]).unwrap(), ["a/b"]);
     // a header that says little does not help
     let mut lying = zipped(&[("a_1.obj", &zeros)]);
     let size = (zeros.len() as u32).to_le_bytes();

@@ -1,22 +1,32 @@
-//! Zip: the central directory names the entries; each is checked against its CRC while it is read.
+//! Zip: the central directory names the entries, which are read one after the other, so that a directory of millions of names
+//! takes no memory; each file is checked against its CRC while it is read.
 
 use super::{ArchiveError, Visit};
 use std::io::{Read, Seek};
-use zip::ZipArchive;
+use zip::ZipReadOptions;
+use zip::read::Config;
+use zip::unstable::read::ZipIterable;
 
 /// The kinds of file in a Unix mode (stat(2)).
 const KIND: u32 = 0o170_000;
 const PLAIN: u32 = 0o100_000;
 const FOLDER: u32 = 0o040_000;
 
-pub(super) fn visit<R: Read + Seek>(file: R, visit: &mut Visit<'_>) -> Result<(), ArchiveError> {
-    let mut zip = ZipArchive::new(file).map_err(|e| visit.broken(e.into()))?;
-    // before the entries are walked: a directory of millions of names takes time
+/// Visits the entries: `directory` and `files` read the same archive.
+pub(super) fn visit<R: Read + Seek>(
+    directory: R,
+    files: R,
+    visit: &mut Visit<'_>,
+) -> Result<(), ArchiveError> {
+    let mut zip = ZipIterable::try_new(directory, Config::default()).map_err(|e| visit.broken(e.into()))?;
+    // before the first is unpacked
     if zip.len() as u64 > visit.limits.entries {
         return Err(visit.too_many());
     }
-    for i in 0..zip.len() {
-        let entry = zip.by_index(i).map_err(|e| visit.broken(e.into()))?;
+    let mut entries =
+        zip.files_with_reader(files, ZipReadOptions::new()).map_err(|e| visit.broken(e.into()))?;
+    while let Some(entry) = entries.next() {
+        let entry = entry.map_err(|e| visit.broken(e.into()))?;
         let name = entry.name_raw().to_vec();
         // names in code page 437 have ASCII in common with UTF-8, and `name` turns the rest
         let name = if name.is_ascii() {

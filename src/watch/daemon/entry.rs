@@ -31,12 +31,16 @@ pub(super) struct Entry {
     /// Whether its job has its name; until then the status is not written.
     pub(super) named: bool,
     pub(super) settling: Option<Settling>,
-    /// When it was last looked at.
-    pub(super) looked: Option<Duration>,
+    /// When it is to be looked at next.
+    pub(super) due: Duration,
+    /// It is not looked at before, whatever is told of it.
+    pub(super) rests: Duration,
     pub(super) phase: Phase,
     pub(super) status: Status,
-    /// The state that was written last.
-    pub(super) written: Option<State>,
+    /// Its changes of state that are still to be told of, each as the status was then, the last one last.
+    pub(super) changes: Vec<Status>,
+    /// So many of them are in the journal.
+    pub(super) journaled: usize,
     /// Whether the status is to be written.
     pub(super) dirty: bool,
     /// When it was written last.
@@ -63,10 +67,12 @@ impl Entry {
             found,
             named: false,
             settling: None,
-            looked: None,
+            due: Duration::ZERO,
+            rests: Duration::ZERO,
             phase: Phase::Settling,
             status: Status { source, ..Status::default() },
-            written: None,
+            changes: Vec::new(),
+            journaled: 0,
             dirty: false,
             wrote: Duration::ZERO,
             retry: Duration::ZERO,
@@ -82,6 +88,7 @@ impl Entry {
     /// Comes into a state, to be written.
     pub(super) fn enter(&mut self, state: State, error: Option<String>) {
         self.status.enter(state, error);
+        self.changes.push(self.status.clone());
         self.dirty = true;
         if state.is_end() {
             self.phase = Phase::Ended;
@@ -89,10 +96,17 @@ impl Entry {
         }
     }
 
+    /// Leaves what happened to it here untold: another daemon's word stands.
+    pub(super) fn hush(&mut self) {
+        self.changes.clear();
+        self.journaled = 0;
+        self.dirty = false;
+    }
+
     /// Whether nothing more is to be done with it, as far as it is known. An empty folder is not yet a job.
     pub(super) fn is_over(&self) -> bool {
         let is_empty = self.phase == Phase::Settling && self.settling.is_some_and(|s| s.seen().files == 0);
-        !self.dirty && (self.phase == Phase::Ended || is_empty && self.looked.is_some())
+        !self.dirty && (self.phase == Phase::Ended || is_empty)
     }
 
     pub(super) fn has_failed(&self) -> bool {

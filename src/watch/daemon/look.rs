@@ -9,10 +9,12 @@ use std::collections::HashSet;
 use std::ffi::OsString;
 use std::time::Duration;
 
+/// One job is looked at for this part of the time at most: thousands of frames that are being copied tell of a change without end.
+const LOOK_SHARE: u32 = 10;
 /// What has settled is looked at again after so long, where no event told of a change.
 const REST: Duration = Duration::from_secs(5);
-/// A scan looks at jobs for so long, the others' turn comes with the next.
-const LOOKS: Duration = SCAN_EVERY[1];
+/// A scan looks at jobs for so long, the others' turn comes with the next, at once; what can be begun is begun between the two.
+const LOOKS: Duration = SCAN_EVERY[0];
 /// A followed sequence without `.done` is whole when it has rested so many times longer than other jobs.
 const FOLLOWED_RESTS: u32 = 30;
 /// So many times with `--once`, which nobody wants to wait for: as long as a frame without a final newline.
@@ -24,6 +26,8 @@ impl Daemon<'_> {
             Ok(inbox) => inbox,
             Err(error) => {
                 self.listed = false;
+                let later = self.now() + self.every;
+                self.entries.values_mut().for_each(|e| e.due = e.due.max(later));
                 return self.in_the_way(&error.to_string());
             }
         };
@@ -47,21 +51,16 @@ impl Daemon<'_> {
         for found in inbox.jobs {
             self.meet(found);
         }
-        let hinted: HashSet<u64> =
-            self.hints.take().iter().filter_map(|name| self.by_file.get(name)).copied().collect();
         let now = self.now();
-        let mut due: Vec<(bool, Option<Duration>, u64)> = self
-            .entries
-            .iter()
-            .filter(|(_, e)| !e.gone)
-            .map(|(id, e)| (!hinted.contains(id), e, *id))
-            .filter(|(is_not_hinted, e, _)| {
-                let is_watched = e.phase == Phase::Settling || e.phase == Phase::Running;
-                !is_not_hinted || is_watched || e.looked.is_none_or(|at| now.saturating_sub(at) >= REST)
-            })
-            .map(|(is_not_hinted, e, id)| (is_not_hinted, e.looked, id))
-            .collect();
-        // what waits longest comes first
+        for name in self.hints.take() {
+            if let Some(entry) = self.by_file.get(&name).and_then(|id| self.entries.get_mut(id)) {
+                entry.due = entry.due.min(now.max(entry.rests));
+            }
+        }
+        let due = self.entries.iter().filter(|(_, e)| !e.gone && e.due <= now);
+        let mut due: Vec<(bool, Duration, u64)> =
+            due.map(|(id, e)| (e.settling.is_none(), e.due, *id)).collect();
+        // what is known may be whole now; then what waits longest comes first
         due.sort_unstable();
         self.listed = true;
         for (_, _, id) in due {
@@ -69,8 +68,22 @@ impl Daemon<'_> {
                 self.listed = false;
                 break;
             }
+            let begun = self.now();
             self.look_at(id);
+            let took = self.now().saturating_sub(begun);
+            if let Some(entry) = self.entries.get_mut(&id) {
+                if entry.phase == Phase::Settling || entry.phase == Phase::Running {
+                    entry.due = entry.due.min(begun + self.every);
+                }
+                entry.rests = begun + LOOK_SHARE * took;
+                entry.due = entry.due.max(entry.rests);
+            }
         }
+    }
+
+    /// When something in the inbox is to be looked at next.
+    pub(super) fn next_look(&self) -> Option<Duration> {
+        self.entries.values().filter(|e| !e.gone).map(|e| e.due).min()
     }
 
     fn meet(&mut self, found: Found) {
@@ -103,7 +116,7 @@ impl Daemon<'_> {
     fn look_at(&mut self, id: u64) {
         let now = self.now();
         let Some(entry) = self.entries.get_mut(&id) else { return };
-        entry.looked = Some(now);
+        entry.due = now + REST;
         let seen = match inbox::look(&self.options.inbox, &entry.found) {
             Ok(seen) => seen,
             Err(error) => {
@@ -171,7 +184,11 @@ impl Daemon<'_> {
             }
         }
         let is_rendering = self.current.contains(&id);
-        if entry.settling.is_some_and(|s| s.is_settled(span, now)) && !is_rendering {
+        let Some(settling) = &entry.settling else { return };
+        if let Some(whole) = settling.settles(span).filter(|at| *at > now) {
+            entry.due = entry.due.min(whole);
+        }
+        if settling.is_settled(span, now) && !is_rendering {
             self.accept(id, run);
         } else if entry.session.as_ref().is_some_and(|s| s.fits.is_none() && !s.ready.is_empty()) {
             self.see_whether_it_fits(id);
@@ -185,7 +202,11 @@ impl Daemon<'_> {
         entry.phase = Phase::Examining;
         entry.enter(State::Accepted, None);
         let place = self.place(&self.entries[&id]);
-        self.intake.examine(id, run, place);
+        let intake = match place.kind {
+            Kind::Folder => &self.folders,
+            Kind::Archive(_) => &self.archives,
+        };
+        intake.examine(id, run, place);
     }
 
     /// Whether a job that grows can be followed; where that cannot be told yet it is asked again.
@@ -240,6 +261,7 @@ impl Daemon<'_> {
             entry.status.job = name;
             entry.status.times.received_ms = received_ms;
             entry.enter(State::Received, None);
+            self.write_first(id);
             return true;
         }
         false
@@ -250,7 +272,6 @@ impl Daemon<'_> {
         let run = run_word(seen);
         let Some(entry) = self.entries.get_mut(&id) else { return false };
         entry.named = true;
-        entry.written = Some(known.state);
         let has_ended = known.ended(&run);
         entry.status = known;
         if has_ended {

@@ -44,11 +44,16 @@ pub(super) struct Daemon<'a> {
     on_event: &'a mut dyn FnMut(&WatchEvent<'_>),
     defaults: Arc<Request>,
     since: Stopwatch,
+    /// Between two scans.
+    every: Duration,
     messages: Receiver<Message>,
     hints: Hints,
-    intake: Intake,
+    folders: Intake,
+    archives: Intake,
     renderer: Renderer,
     notifier: Option<Notifier>,
+    /// Ends that somebody is being told of.
+    untold: u64,
     claims: Claims,
     journal: Journal,
     view: Option<Shared>,
@@ -91,10 +96,10 @@ impl<'a> Daemon<'a> {
         let notifier = Notifier::start(&options.notices, send.clone())?;
         let mut claims = Claims::open(&own.join("claims"), since.elapsed())?;
         clear_unpacked(&own.join("unpacked"), &mut claims, since.elapsed());
-        let (journal, known) = Journal::open(&own.join("journal"))?;
+        let (journal, known) = Journal::open(&own.join("journal"), notifier.is_some())?;
         let view = options.listen.map(|_| Shared::default());
         if let Some(view) = &view {
-            let mut ended: Vec<_> = known.iter().filter(|s| s.state.is_end()).cloned().collect();
+            let mut ended: Vec<_> = known.last.iter().filter(|s| s.state.is_end()).cloned().collect();
             ended.sort_by_key(|s| s.times.ended_ms);
             let mut view = view.lock();
             for status in ended {
@@ -109,12 +114,15 @@ impl<'a> Daemon<'a> {
             on_event,
             defaults: Arc::new(options.defaults.clone()),
             since,
+            every: (options.settle / 4).clamp(SCAN_EVERY[0], SCAN_EVERY[1]),
             messages,
             hints,
-            intake: Intake::start(send),
+            folders: Intake::start(&send),
+            archives: Intake::start(&send),
             devices: renderer.devices.clone(),
             renderer,
             notifier,
+            untold: 0,
             claims,
             journal,
             view,
@@ -122,7 +130,7 @@ impl<'a> Daemon<'a> {
             by_file: HashMap::new(),
             last_id: 0,
             current: BTreeSet::new(),
-            received: known.into_iter().map(|s| (s.job, s.times.received_ms)).collect(),
+            received: known.last.into_iter().map(|s| (s.job, s.times.received_ms)).collect(),
             said: HashMap::new(),
             others: HashSet::new(),
             blocked_until: Duration::ZERO,
@@ -135,20 +143,25 @@ impl<'a> Daemon<'a> {
         if let Some(why) = no_hints {
             daemon.note(&why);
         }
+        for end in &known.due {
+            daemon.notify(end, &options.out.join(&end.job));
+        }
         Ok(daemon)
     }
 
     /// Watches until it is asked to stop, or with `once` until every job present has ended.
     pub(super) fn watch(mut self, stop: &Stop) -> Result<Ended, WatchError> {
-        let every = (self.options.settle / 4).clamp(SCAN_EVERY[0], SCAN_EVERY[1]);
         let mut next = Duration::ZERO;
         loop {
             let now = self.now();
             if now >= next {
-                next = now + every;
                 self.tick(stop);
                 if let Some(ended) = self.end() {
                     return Ok(ended);
+                }
+                next = now + self.every;
+                if let Some(at) = self.next_look().filter(|_| !self.stopping) {
+                    next = next.min(at);
                 }
             }
             let wait = next.saturating_sub(self.now());
@@ -160,13 +173,12 @@ impl<'a> Daemon<'a> {
                     while let Ok(message) = self.messages.try_recv() {
                         self.take(message);
                     }
-                    self.write_all();
                     self.take_turns();
                     self.write_all();
                 }
                 Err(RecvTimeoutError::Timeout) => {}
                 // the renderer's thread holds a sender as long as this does
-                Err(RecvTimeoutError::Disconnected) => std::thread::sleep(every),
+                Err(RecvTimeoutError::Disconnected) => std::thread::sleep(self.every),
             }
         }
     }
@@ -189,7 +201,6 @@ impl<'a> Daemon<'a> {
         if !self.stopping {
             self.scan();
         }
-        self.write_all();
         self.take_turns();
         self.write_all();
         self.renew_view();
@@ -200,6 +211,7 @@ impl<'a> Daemon<'a> {
             Message::Hint => {}
             Message::Examined(id, run, examined) => self.examined(id, &run, examined),
             Message::Told(id, told) => self.told(id, told),
+            Message::WasTold(end) => self.was_told(&end),
             Message::Note(text) => self.note(&text),
         }
     }
@@ -210,15 +222,12 @@ impl<'a> Daemon<'a> {
         let is_over = if stopped {
             self.current.is_empty()
         } else {
-            self.options.once && self.listed && self.entries.values().all(Entry::is_over)
+            self.options.once && self.listed && self.untold == 0 && self.entries.values().all(Entry::is_over)
         };
         if !is_over {
             return None;
         }
         self.let_go();
-        if stopped && let Some(notifier) = &mut self.notifier {
-            notifier.leave();
-        }
         let failed = self.entries.values().filter(|e| e.has_failed()).count();
         Some(Ended { failed, stopped })
     }

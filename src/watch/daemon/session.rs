@@ -1,6 +1,6 @@
 //! The part of a growing sequence that was seen, and what of it was rendered.
 
-use crate::watch::follow::{Frames, Stamp};
+use crate::watch::follow::{Frames, Look, Stamp};
 use crate::watch::{follow_run, inbox};
 use std::collections::{BTreeMap, HashMap, HashSet};
 use std::ffi::{OsStr, OsString};
@@ -20,6 +20,11 @@ pub(super) struct Session {
     pub(super) fits: Option<bool>,
     /// Frame files there.
     pub(super) all: u64,
+    /// Files that are taken for whole although they do not end so.
+    pub(super) doubtful: HashSet<OsString>,
+    /// Pictures that were made, and those whose frames failed.
+    made: HashSet<String>,
+    failed: HashSet<String>,
 }
 
 impl Session {
@@ -44,10 +49,16 @@ impl Session {
             let stamp = self.frames.stamp(name);
             let was_handed = self.handed.get(*name).copied() == stamp;
             let next = order.get(at + 1).is_some_and(|(after, _)| after.text == of.text);
+            let ends_whole = || follow_run::ends_whole(&root.join(name));
             let is_whole = was_handed
-                || self
-                    .frames
-                    .is_whole(name, next, done, settle, now, || follow_run::ends_whole(&root.join(name)));
+                || match self.frames.look(name, next, done, settle, now, ends_whole) {
+                    Look::Grows => false,
+                    Look::Whole => true,
+                    Look::Rests => {
+                        self.doubtful.insert((*name).clone());
+                        true
+                    }
+                };
             first_is_whole |= at == 0 && is_whole;
             if !first_is_whole {
                 break;
@@ -59,6 +70,15 @@ impl Session {
             }
         }
         Ok(())
+    }
+
+    /// A picture's frame ended, perhaps not for the first time: how many were made, and how many failed.
+    pub(super) fn ended(&mut self, picture: &str, failed: bool) -> (u64, u64) {
+        let (now, before) =
+            if failed { (&mut self.failed, &mut self.made) } else { (&mut self.made, &mut self.failed) };
+        before.remove(picture);
+        now.insert(picture.to_owned());
+        (self.made.len() as u64, self.failed.len() as u64)
     }
 
     /// Takes the files that are ready.

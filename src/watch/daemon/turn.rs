@@ -37,7 +37,11 @@ impl Daemon<'_> {
 
     /// Begins the jobs whose turn it is: of the highest priority, then those that came first.
     pub(super) fn take_turns(&mut self) {
-        while self.current.len() < JOBS_AT_ONCE && !self.stopping && self.now() >= self.blocked_until {
+        loop {
+            let free = JOBS_AT_ONCE - self.current.len();
+            if free == 0 || self.stopping || self.now() < self.blocked_until {
+                return;
+            }
             if self.is_full
                 && let Some(why) = self.full_disk()
             {
@@ -55,12 +59,16 @@ impl Daemon<'_> {
                     && !e.gone
                     && (e.phase == Phase::Queued || grows)
             };
-            let order =
-                |(id, e): &(&u64, &Entry)| (Reverse(e.status.priority), e.status.times.received_ms, **id);
-            let next =
-                self.entries.iter().filter(|(id, e)| waits(id, e)).min_by_key(order).map(|(id, _)| *id);
-            let Some(id) = next else { return };
-            self.begin(id);
+            let waiting = self.entries.iter().filter(|(id, e)| waits(id, e));
+            let mut next: Vec<_> = waiting
+                .map(|(id, e)| (Reverse(e.status.priority), e.status.times.received_ms, *id))
+                .collect();
+            if next.is_empty() {
+                return;
+            }
+            next.sort_unstable();
+            // each is begun, or put off, so that another one may have its place
+            next.iter().take(free).for_each(|(_, _, id)| self.begin(*id));
         }
     }
 
@@ -88,10 +96,12 @@ impl Daemon<'_> {
         let followed = self.options.follow && entry.found.kind == Kind::Folder;
         let stop = Arc::new(Stop::default());
         let Some(entry) = self.entries.get_mut(&id) else { return };
+        let mut doubtful = Vec::new();
         let only = if entry.phase == Phase::Settling {
             let session = entry.session.as_mut();
             session.map(|session| {
                 entry.status.frames.all = session.all;
+                doubtful.extend(session.doubtful.drain());
                 session.hand_over()
             })
         } else {
@@ -109,6 +119,13 @@ impl Daemon<'_> {
         let priority = entry.status.priority;
         let order = Order { id, place, defaults: Arc::clone(&self.defaults), only, followed, priority, stop };
         self.current.insert(id);
+        for file in doubtful {
+            self.note(&format!(
+                "{}: {} may be torn: it does not end as a whole file does, but has not grown for long; it is taken as it stands",
+                order.place.source.display(),
+                file.display()
+            ));
+        }
         if !self.renderer.order(order) {
             self.told(
                 id,
@@ -126,10 +143,9 @@ impl Daemon<'_> {
             !entry.status.run.is_empty() && k.source == entry.status.source && k.ended(&entry.status.run)
         });
         let Some(ended) = ended else { return false };
-        entry.written = Some(ended.state);
         entry.status = ended;
         entry.phase = Phase::Ended;
-        entry.dirty = false;
+        entry.hush();
         entry.session = None;
         if let Some(claim) = entry.claim.take() {
             claim.give_back();
@@ -163,10 +179,15 @@ impl Daemon<'_> {
         let Some(entry) = self.entries.get_mut(&id) else { return };
         let failed = frame.error.is_some();
         if failed {
-            entry.status.frames.failed += 1;
             entry.first_error.get_or_insert_with(|| frame.error.clone().unwrap_or_default());
+        }
+        let counts = &mut entry.status.frames;
+        if let Some(session) = entry.session.as_mut().filter(|_| entry.phase == Phase::Settling) {
+            (counts.done, counts.failed) = session.ended(&frame.picture, failed);
+        } else if failed {
+            counts.failed += 1;
         } else {
-            entry.status.frames.done += 1;
+            counts.done += 1;
         }
         entry.dirty = true;
         let made = self.out(&self.entries[&id]).join(&frame.picture);

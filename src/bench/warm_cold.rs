@@ -1,0 +1,191 @@
+//! The workload `warm-cold`: what a frame costs when everything is new and when it follows another, beside the thesis's own
+//! figures for its scenes.
+
+use super::dots::dots;
+use super::sequences::TWIST;
+use super::table::{Cell, Table};
+use super::times::Spread;
+use super::{Bench, BenchError, Event, Findings, child};
+use crate::device::gpu::adapters;
+use std::ffi::{OsStr, OsString};
+use std::fs;
+use std::path::PathBuf;
+
+/// The thesis's scenes that can be had, their files, and its table 6.5 (device 1, 1280x720): start, cold, warm, save in seconds.
+const THESIS: [(&str, &str, [f64; 4]); 11] = [
+    ("CornellBox-Empty", "cornell-box/CornellBox-Empty-CO.obj", [1.1438, 0.0111, 0.0042, 0.0253]),
+    ("CornellBox-Original", "cornell-box/CornellBox-Original.obj", [1.1459, 0.0133, 0.0049, 0.0252]),
+    ("CornellBox-Mirror", "cornell-box/CornellBox-Mirror.obj", [1.1484, 0.0137, 0.0053, 0.0253]),
+    ("Monkey", "suzanne/suzanne.obj", [1.1168, 0.0320, 0.0062, 0.0253]),
+    ("CornellBox-Glossy", "cornell-box/CornellBox-Glossy.obj", [1.1484, 0.0373, 0.0053, 0.0248]),
+    ("CornellBox-Sphere", "cornell-box/CornellBox-Sphere.obj", [1.1552, 0.0695, 0.0119, 0.0254]),
+    ("CornellBox-Water", "cornell-box/CornellBox-Water.obj", [1.1674, 0.2322, 0.0240, 0.0255]),
+    ("Dragon", "dragon/dragon_23k.obj", [1.2858, 1.1295, 0.0116, 0.0282]),
+    ("Bunny", "bunny/stanford-bunny.obj", [1.2980, 1.5491, 0.0060, 0.0257]),
+    ("Sibenik", "sibenik/sibenik.obj", [2.0187, 1.3758, 0.0253, 0.0373]),
+    ("Conference", "conference/conference.obj", [2.5607, 2.4926, 0.0217, 0.0312]),
+];
+
+/// Frames of a still scene, and of a sequence at most.
+const FRAMES: usize = 9;
+/// Side and frames of the made sequence.
+const SIDE: u32 = 100;
+const MADE_FRAMES: u32 = 9;
+
+/// What is rendered, and the thesis's figures for it.
+struct Input {
+    name: String,
+    path: PathBuf,
+    thesis: Option<[f64; 4]>,
+}
+
+/// Runs it.
+pub(super) fn warm_cold(bench: &Bench, on_event: &mut dyn FnMut(&Event<'_>)) -> Result<Findings, BenchError> {
+    let mut table = Table::new(
+        "warm-cold",
+        "A frame, 1280x720, one sample, each run in a process of its own: start (reading, parsing), and with a warm store; the first frame on the device; a frame after it; saving; cold over warm: (start + first)/after. Beside it the thesis's figures for its scenes on its machine of 2012.",
+        &[
+            "start, ms",
+            "with store, ms",
+            "first, ms",
+            "after, ms",
+            "save, ms",
+            "process, MB",
+            "device, MB",
+            "cold/warm",
+            "thesis start, ms",
+            "first, ms ",
+            "after, ms ",
+            "save, ms ",
+            "cold/warm ",
+        ],
+    );
+    let devices = devices(bench);
+    for input in inputs(bench)? {
+        for device in &devices {
+            let name =
+                if devices.len() == 1 { input.name.clone() } else { format!("{}, {device}", input.name) };
+            on_event(&Event::Stage(&name));
+            if let Some(cells) = measured(bench, &input, device)? {
+                table.row(name, cells);
+            }
+        }
+    }
+    let mut found = Findings::default();
+    let columns = [
+        (0, "start"),
+        (2, "first frame"),
+        (3, "a frame after it"),
+        (8, "start, 2012"),
+        (10, "a frame after it, 2012"),
+    ];
+    found.drawn("warm-cold".to_string(), dots(&table, "Cold and warm", "ms", &columns))?;
+    found.add(table, on_event);
+    Ok(found)
+}
+
+/// The device that was named; else the CPU and every GPU that is hardware.
+fn devices(bench: &Bench) -> Vec<String> {
+    let named = bench.options.device.clone();
+    named.map_or_else(
+        || {
+            let usable = adapters().into_iter().filter(|a| !a.is_software() && a.lacks().is_none());
+            ["cpu".to_string()].into_iter().chain(usable.map(|a| a.name())).collect()
+        },
+        |name| vec![name],
+    )
+}
+
+/// Still scenes as jobs of a few frames that differ in nothing but a shade of ambient light, and sequences.
+fn inputs(bench: &Bench) -> Result<Vec<Input>, BenchError> {
+    let mut inputs = Vec::new();
+    for (name, file, thesis) in THESIS {
+        let Some(path) = bench.scene(file) else { continue };
+        let job = bench.room.path().join(format!("{name}.yaml"));
+        let mut text =
+            format!("version: 1\nlayers:\n  - sequence: {path:?}\nframes: 1-{FRAMES}\noverrides:\n");
+        for frame in 1..=FRAMES {
+            text += &format!("  - {{frames: {frame}-{frame}, ambient: {:.4}}}\n", 0.1 + 1e-4 * frame as f64);
+        }
+        fs::write(&job, text)?;
+        inputs.push(Input { name: name.to_string(), path: job, thesis: Some(thesis) });
+    }
+    let folders =
+        bench.options.scenes.iter().filter_map(|folder| fs::read_dir(folder).ok()).flatten().flatten();
+    let mut sequences: Vec<PathBuf> = folders.map(|e| e.path()).collect();
+    sequences.retain(|path| {
+        path.is_dir() && path.file_name().is_some_and(|n| n.to_string_lossy().starts_with("seq-"))
+    });
+    sequences.sort();
+    let folder = bench.room.path().join("made sheet");
+    TWIST.write(SIDE, MADE_FRAMES, &folder)?;
+    sequences.push(folder);
+    for path in sequences {
+        let name = path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
+        inputs.push(Input { name, path, thesis: None });
+    }
+    let step = if bench.options.quick { 4 } else { 1 };
+    Ok(inputs.into_iter().step_by(step).collect())
+}
+
+/// A row; None where nothing is rendered.
+fn measured(bench: &Bench, input: &Input, device: &str) -> Result<Option<[Cell; 13]>, BenchError> {
+    let store = bench.room.path().join("store");
+    let run = |kept: bool| {
+        let cache: OsString = if kept { store.clone().into() } else { "--no-cache".into() };
+        let mut options: Vec<&OsStr> = ["--size", "1280x720", "--device", device].map(OsStr::new).to_vec();
+        if kept {
+            options.push(OsStr::new("--cache"));
+        }
+        options.push(&cache);
+        child::render(bench, &input.path, &bench.room.path().join("report.json"), &options)
+    };
+    let mut ms: [Vec<f64>; 5] = Default::default();
+    let mut bytes: [Vec<f64>; 2] = Default::default();
+    run(true)?;
+    for _ in 0..bench.rounds(8).max(3) {
+        let Some(report) = run(false)? else { return Ok(None) };
+        let Some(with_store) = run(true)? else { return Ok(None) };
+        let frames = child::rendered(&report);
+        let (Some(first), kept) = (frames.first(), child::rendered(&with_store)) else { return Ok(None) };
+        let Some(kept) = kept.first() else { return Ok(None) };
+        const START: [&str; 2] = ["read", "parse"];
+        const FIRST: [&str; 3] = ["upload", "update", "trace"];
+        const AFTER: [&str; 4] = ["diff", "upload", "update", "trace"];
+        const SAVE: [&str; 2] = ["encode", "write"];
+        let after = frames.iter().skip(1).map(|f| child::sum_ms(f, "ms", &AFTER)).collect();
+        let save = frames.iter().map(|f| child::sum_ms(f, "ms", &SAVE)).collect();
+        let medians = [after, save].map(|all| Spread::of(all).map(|s| s.median));
+        let [Some(after), Some(save)] = medians else { return Ok(None) };
+        let of_first = [
+            child::sum_ms(first, "ms", &START),
+            child::sum_ms(kept, "ms", &START),
+            child::sum_ms(first, "ms", &FIRST),
+        ];
+        ms.iter_mut().zip(of_first.into_iter().chain([after, save])).for_each(|(all, x)| all.push(x));
+        let held = [&report["totals"]["peak_rss_bytes"], &report["devices"][0]["resident"]["peak"]];
+        bytes.iter_mut().zip(held).for_each(|(all, x)| all.extend(x.as_f64().map(|b| b / 1e6)));
+    }
+    let [start, kept, first, after, save] = ms.map(|all| Cell::from(Spread::of(all)));
+    let [process, device] = bytes.map(|all| Cell::from(Spread::of(all).map(|s| s.median)));
+    let ratio_of = |values: [Option<f64>; 3]| match values {
+        [Some(start), Some(first), Some(after)] if after > 0.0 => Cell::from((start + first) / after),
+        _ => Cell::Absent,
+    };
+    let then = |i: usize| input.thesis.map(|t| t[i] * 1e3);
+    Ok(Some([
+        start,
+        kept,
+        first,
+        after,
+        save,
+        process,
+        device,
+        ratio_of([start.value(), first.value(), after.value()]),
+        then(0).into(),
+        then(1).into(),
+        then(2).into(),
+        then(3).into(),
+        ratio_of([then(0), then(1), then(2)]),
+    ]))
+}
