@@ -14,7 +14,7 @@ pub(super) fn render(
     options: &[&OsStr],
 ) -> Result<Option<Value>, BenchError> {
     let _ = std::fs::remove_file(report);
-    let mut command = Command::new(std::env::current_exe()?);
+    let mut command = Command::new(&bench.options.program);
     command.arg("render").arg(input).args(options).arg("--report").arg(report);
     command.args(["--overwrite", "--lenient", "--quiet", "--threads", &bench.options.threads.to_string()]);
     command.arg("-o").arg(bench.room.path().join("pictures"));

@@ -61,7 +61,11 @@ fn draw(
         };
         root.draw(&Text::new(label, (at, bottom + 12), text(13, HPos::Center)))?;
     }
-    root.draw(&Text::new(unit.to_string(), ((LEFT + RIGHT) / 2, bottom + 32), text(14, HPos::Center)))?;
+    root.draw(&Text::new(
+        unit.to_string(),
+        (i32::midpoint(LEFT, RIGHT), bottom + 32),
+        text(14, HPos::Center),
+    ))?;
     for (row, (name, _)) in table.rows.iter().enumerate() {
         let y = TOP + ROW * row as i32 + ROW / 2;
         root.draw(&Text::new(name.clone(), (LEFT - 8, y), text(13, HPos::Right)))?;

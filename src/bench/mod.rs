@@ -76,6 +76,8 @@ pub struct BenchOptions {
     pub mitsuba: Option<Mitsuba>,
     /// The device of the tables of devices; None: the best there is.
     pub device: Option<String>,
+    /// This program, for runs in processes of their own.
+    pub program: PathBuf,
     /// The folder of a store, where references are kept.
     pub store: Option<PathBuf>,
     /// Fewer runs, smaller made scenes.

@@ -1,6 +1,8 @@
 //! The workload `needs`: what each feature costs a scene that has it and does not use it, and one that does. The scene is a sheet
 //! that is twisted; beside it stands the same without.
 
+use super::dots::dots;
+use super::scenes::quoted;
 use super::table::{Cell, Table};
 use super::times::Spread;
 use super::{Bench, BenchError, Event, Findings};
@@ -9,8 +11,9 @@ use crate::device::{Device, DeviceError, Stop};
 use crate::plan::{Wishes, plan_frame};
 use crate::run::{RunOptions, read_shot};
 use crate::scene::{Aov, AovSet, Filter, Frame, Light, Shot};
+use std::fmt::Write as _;
 use std::fs;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 const SIDE: u32 = 100;
 const SIZE: [u32; 2] = [640, 360];
@@ -81,10 +84,7 @@ pub(super) fn needs(bench: &Bench, on_event: &mut dyn FnMut(&Event<'_>)) -> Resu
     }
     let mut found = Findings::default();
     let columns = [(0, "without"), (1, "there, not used"), (3, "used")];
-    found.drawn(
-        "needs".to_string(),
-        super::dots::dots(&table, "What features cost", "tracing, ms", &columns),
-    )?;
+    found.drawn("needs".to_string(), dots(&table, "What features cost", "tracing, ms", &columns))?;
     found.add(table, on_event);
     Ok(found)
 }
@@ -95,7 +95,9 @@ fn two(shot: &Shot) -> Vec<Light> {
 
 fn all_aovs() -> AovSet {
     let mut aovs = AovSet::default();
-    Aov::ALL.into_iter().for_each(|aov| aovs.insert(aov));
+    for aov in Aov::ALL {
+        aovs.insert(aov);
+    }
     aovs
 }
 
@@ -158,11 +160,11 @@ fn scene(bench: &Bench, name: &str, made: Made<'_>) -> Result<(Frame, Shot), Ben
 }
 
 /// All parts as layers, seen from one place.
-fn job(bench: &Bench, folder: &std::path::Path, files: &[PathBuf]) -> Result<crate::job::Job, BenchError> {
+fn job(bench: &Bench, folder: &Path, files: &[PathBuf]) -> Result<crate::job::Job, BenchError> {
     let file = folder.join("job.yaml");
     let mut yaml = "version: 1\nlayers:\n".to_string();
     for file in files {
-        yaml += &format!("  - sequence: {file:?}\n");
+        let _ = writeln!(yaml, "  - sequence: {}", quoted(file));
     }
     yaml += "camera: {eye: [1.5, 1.2, 3], look_at: [0, 0, 0], fov: 40}\nlights:\n  - point: {position: [4, 5, 6], intensity: 1}\n";
     fs::write(&file, yaml)?;
@@ -175,25 +177,21 @@ fn text(side: u32, part: u32, made: Made<'_>) -> String {
     for j in 0..side {
         for i in 0..side {
             let [x, y] = [i, j].map(|k| 2.0 * f64::from(k) / f64::from(side - 1) - 1.0);
-            text += &format!(
-                "v {x:.6} {y:.6} {:.6}\nvt {} {}\n",
-                0.3 * (4.0 * x).sin() * (3.0 * y).cos(),
-                4.0 * x,
-                4.0 * y
-            );
+            let z = 0.3 * (4.0 * x).sin() * (3.0 * y).cos();
+            let _ = writeln!(text, "v {x:.6} {y:.6} {z:.6}\nvt {} {}", 4.0 * x, 4.0 * y);
         }
     }
     if made.other.is_some() && !made.is_used {
         text += "v 8 8 20\nv 8 9 20\nv 9 8 20\nusemtl other\n";
         let last = side * side;
-        text += &format!("f {}/1 {}/1 {}/1\n", last + 1, last + 2, last + 3);
+        let _ = writeln!(text, "f {}/1 {}/1 {}/1", last + 1, last + 2, last + 3);
     }
     text += if made.is_used { "usemtl other\n" } else { "usemtl sheet\n" };
     for j in (0..side - 1).filter(|j| j % made.parts == part) {
         for i in 0..side - 1 {
             let a = j * side + i + 1;
             let [b, c, d] = [a + 1, a + side, a + side + 1];
-            text += &format!("f {a}/{a} {b}/{b} {d}/{d}\nf {a}/{a} {d}/{d} {c}/{c}\n");
+            let _ = writeln!(text, "f {a}/{a} {b}/{b} {d}/{d}\nf {a}/{a} {d}/{d} {c}/{c}");
         }
     }
     text

@@ -48,3 +48,9 @@ fn list(folder: &Path) -> Vec<PathBuf> {
 fn gcd(a: usize, b: usize) -> usize {
     if b == 0 { a } else { gcd(b, a % b) }
 }
+
+/// A path as a string of YAML.
+pub(super) fn quoted(path: &Path) -> String {
+    // strings of JSON are strings of YAML
+    serde_json::json!(path.to_string_lossy()).to_string()
+}

@@ -11,7 +11,7 @@ use super::trees::{EMBREE_REFIT_1, Mesh, trees};
 use super::view::View;
 use super::warm::{WarmPeers, warm_frames};
 use super::{Bench, BenchError, Event, Findings};
-use crate::device::registry;
+use crate::device::{DeviceKind, registry};
 use crate::format::{ReadOptions, TextureCache, load_obj};
 use crate::run::machine;
 use std::fs;
@@ -107,6 +107,10 @@ fn devices(
         store: None,
     };
     let mut device = registry::open(bench.options.device.as_deref(), &wanted)?;
+    if bench.options.quick && bench.options.only.is_empty() && device.info().kind != DeviceKind::Gpu {
+        // they are tables of GPUs: on a CPU they take minutes
+        return Ok(());
+    }
     let meshes = meshes(bench, hostile)?;
     if bench.wants("frames") {
         on_event(&Event::Stage("frames of a device"));

@@ -2,12 +2,14 @@
 //! figures for its scenes.
 
 use super::dots::dots;
+use super::scenes::quoted;
 use super::sequences::TWIST;
 use super::table::{Cell, Table};
 use super::times::Spread;
 use super::{Bench, BenchError, Event, Findings, child};
 use crate::device::gpu::adapters;
 use std::ffi::{OsStr, OsString};
+use std::fmt::Write as _;
 use std::fs;
 use std::path::PathBuf;
 
@@ -31,6 +33,12 @@ const FRAMES: usize = 9;
 /// Side and frames of the made sequence.
 const SIDE: u32 = 100;
 const MADE_FRAMES: u32 = 9;
+
+/// Terms of a frame's time: before the device, on it in the first frame and in another, and after it.
+const START: [&str; 2] = ["read", "parse"];
+const FIRST: [&str; 3] = ["upload", "update", "trace"];
+const AFTER: [&str; 4] = ["diff", "upload", "update", "trace"];
+const SAVE: [&str; 2] = ["encode", "write"];
 
 /// What is rendered, and the thesis's figures for it.
 struct Input {
@@ -103,9 +111,10 @@ fn inputs(bench: &Bench) -> Result<Vec<Input>, BenchError> {
         let Some(path) = bench.scene(file) else { continue };
         let job = bench.room.path().join(format!("{name}.yaml"));
         let mut text =
-            format!("version: 1\nlayers:\n  - sequence: {path:?}\nframes: 1-{FRAMES}\noverrides:\n");
+            format!("version: 1\nlayers:\n  - sequence: {}\nframes: 1-{FRAMES}\noverrides:\n", quoted(&path));
         for frame in 1..=FRAMES {
-            text += &format!("  - {{frames: {frame}-{frame}, ambient: {:.4}}}\n", 0.1 + 1e-4 * frame as f64);
+            let ambient = 0.1 + 1e-4 * frame as f64;
+            let _ = writeln!(text, "  - {{frames: {frame}-{frame}, ambient: {ambient:.4}}}");
         }
         fs::write(&job, text)?;
         inputs.push(Input { name: name.to_string(), path: job, thesis: Some(thesis) });
@@ -149,10 +158,6 @@ fn measured(bench: &Bench, input: &Input, device: &str) -> Result<Option<[Cell; 
         let frames = child::rendered(&report);
         let (Some(first), kept) = (frames.first(), child::rendered(&with_store)) else { return Ok(None) };
         let Some(kept) = kept.first() else { return Ok(None) };
-        const START: [&str; 2] = ["read", "parse"];
-        const FIRST: [&str; 3] = ["upload", "update", "trace"];
-        const AFTER: [&str; 4] = ["diff", "upload", "update", "trace"];
-        const SAVE: [&str; 2] = ["encode", "write"];
         let after = frames.iter().skip(1).map(|f| child::sum_ms(f, "ms", &AFTER)).collect();
         let save = frames.iter().map(|f| child::sum_ms(f, "ms", &SAVE)).collect();
         let medians = [after, save].map(|all| Spread::of(all).map(|s| s.median));

@@ -53,6 +53,7 @@ pub(super) struct BenchArgs {
 pub(super) fn bench(args: &BenchArgs, global: &Global) -> Result<ExitCode> {
     let set = |name: &str| std::env::var_os(name).filter(|value| !value.is_empty()).map(PathBuf::from);
     let options = BenchOptions {
+        program: std::env::current_exe()?,
         folder: args.output.clone(),
         scenes: args.scenes.clone().or_else(|| set("RENTIX_SCENES")),
         embree: args.embree.clone().or_else(|| set("RENTIX_EMBREE")),

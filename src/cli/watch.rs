@@ -83,7 +83,9 @@ pub(super) fn watch(args: &WatchArgs, global: &Global) -> Result<ExitCode> {
         || render.movie.is_some()
         || render.progress != ProgressKind::Auto;
     if asks_for_one_run {
-        bail!("--job, --chunk, --order, --report, --progress, --movie, --cold and --dry-run are for `rentix render`");
+        bail!(
+            "--job, --chunk, --order, --report, --progress, --movie, --cold and --dry-run are for `rentix render`"
+        );
     }
     let settle = seconds("--settle", args.settle.unwrap_or(2.0))?;
     let on_done_within = seconds("--on-done-within", args.on_done_within.unwrap_or(300.0))?;

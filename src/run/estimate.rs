@@ -129,7 +129,7 @@ impl Kept {
         // what was kept from an earlier frame takes none
         let ms = ms.filter(|&ms| ms > 0.0)?;
         let mut estimates = self.lock();
-        let expected = estimates.expect(term, units);
+        let expected = estimates.expected(term, units);
         estimates.learn(term, units, ms / 1e3);
         Some(1e3 * expected.value)
     }
@@ -174,14 +174,15 @@ impl Estimator {
 
     /// What so many units of a term of the host's will take.
     pub(super) fn host(&self, term: Term<'_>, units: f64) -> Expected {
-        self.host.lock().expect(term, units)
+        self.host.lock().expected(term, units)
     }
 
     /// Seconds of making a frame resident and of tracing it.
     pub(super) fn device_s(&self, device: usize, work: &DeviceWork) -> [Expected; 2] {
         let estimates = self.devices[device].lock();
-        let of =
-            |term, units: f64| if units > 0.0 { estimates.expect(term, units) } else { Expected::default() };
+        let of = |term, units: f64| {
+            if units > 0.0 { estimates.expected(term, units) } else { Expected::default() }
+        };
         let update = [
             of(Term::Upload, work.uploaded as f64),
             of(Term::Build, work.built as f64),
@@ -209,7 +210,8 @@ impl Estimator {
     /// Tells what a device is expected to take for a frame.
     pub(super) fn begins(&self, device: usize, work: &DeviceWork, report: &mut FrameReport) {
         let estimates = self.devices[device].lock();
-        let ms = |term, units: f64| 1e3 * if units > 0.0 { estimates.expect(term, units).value } else { 0.0 };
+        let ms =
+            |term, units: f64| 1e3 * if units > 0.0 { estimates.expected(term, units).value } else { 0.0 };
         let predicted = &mut report.predicted_ms;
         predicted.upload = Some(ms(Term::Upload, work.uploaded as f64));
         predicted.update = Some(ms(Term::Build, work.built as f64) + ms(Term::Refit, work.refitted as f64));
@@ -253,7 +255,7 @@ impl Estimator {
     /// Bytes of trees over so many triangles.
     pub(super) fn tree_bytes(&self, device: usize, triangles: u64) -> Expected {
         let reckoned = triangles * TREE_BYTES_PER_TRIANGLE;
-        self.devices[device].lock().expect(Term::TreeBytes, reckoned as f64)
+        self.devices[device].lock().expected(Term::TreeBytes, reckoned as f64)
     }
 
     /// Learns how large the trees are that a plan had built.
@@ -277,7 +279,7 @@ impl Estimator {
     /// Bytes of the host's memory that the run is expected to take; None before its first frame was read.
     pub(super) fn host_bytes(&self) -> Option<u64> {
         let reckoned = *self.host_bytes.get()?;
-        Some(self.host.lock().expect(Term::HostBytes, reckoned as f64).value as u64)
+        Some(self.host.lock().expected(Term::HostBytes, reckoned as f64).value as u64)
     }
 
     /// Learns what it took.

@@ -134,7 +134,7 @@ impl Estimates {
     }
 
     /// What so many units of a term will take.
-    pub fn expect(&self, term: Term<'_>, units: f64) -> Expected {
+    pub fn expected(&self, term: Term<'_>, units: f64) -> Expected {
         let name = term.name();
         let [past, now] = [&self.past, &self.now].map(|rates| rates.get(&name));
         let value = self.by_past(term, units) * now.and_then(Rate::median).unwrap_or(0.0).exp();
@@ -181,29 +181,29 @@ mod tests {
     fn what_was_measured_counts_in_this_run_and_in_the_next() {
         let mut first = Estimates::new(Speeds::Cpu(2), b"");
         // 2 ns a unit and thread are assumed, to within a factor of 2
-        let assumed = first.expect(TRACE, 1e9);
+        let assumed = first.expected(TRACE, 1e9);
         assert!(near(assumed.value, 1.0) && near(assumed.error, 1.0), "{assumed:?}");
         for measured in [3.0, 3.0, 100.0, 3.0] {
             first.learn(TRACE, 1e9, measured);
         }
-        let learned = first.expect(TRACE, 2e9);
+        let learned = first.expected(TRACE, 2e9);
         // the one that was disturbed moves the value not at all, and the error: (ln 2 + ln(100/3)) / 5
         let spread = (200.0_f64 / 3.0).ln() / 5.0;
         assert!(near(learned.value, 6.0) && near(learned.error, 6.0 * spread.exp_m1()), "{learned:?}");
         // mirrors and glass, other formats and other terms are other rates
-        assert!(near(first.expect(Term::Trace { is_deep: true }, 1e9).value, 4.0));
+        assert!(near(first.expected(Term::Trace { is_deep: true }, 1e9).value, 4.0));
         let next = Estimates::new(Speeds::Cpu(2), &first.kept(b""));
-        assert!(near(next.expect(TRACE, 2e9).value, 6.0));
+        assert!(near(next.expected(TRACE, 2e9).value, 6.0));
         // one run is no certainty yet: (ln 2 + 0) / 2
-        assert!(near(next.expect(TRACE, 1e9).error, 3.0 * (0.5_f64 * 2.0_f64.ln()).exp_m1()));
+        assert!(near(next.expected(TRACE, 1e9).error, 3.0 * (0.5_f64 * 2.0_f64.ln()).exp_m1()));
         assert_eq!(Estimates::new(Speeds::Gpu, b"{damaged"), Estimates::new(Speeds::Gpu, b""));
     }
 
     #[test]
     fn small_work_takes_what_the_least_takes() {
         let host = Estimates::new(Speeds::Host, b"");
-        assert_eq!(host.expect(Term::Read, 10.0), host.expect(Term::Read, 0.0));
-        assert!(host.expect(Term::Read, 10.0).value > 0.0);
+        assert_eq!(host.expected(Term::Read, 10.0), host.expected(Term::Read, 0.0));
+        assert!(host.expected(Term::Read, 10.0).value > 0.0);
     }
 
     #[test]
