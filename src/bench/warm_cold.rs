@@ -8,6 +8,7 @@ use super::table::{Cell, Table};
 use super::times::Spread;
 use super::{Bench, BenchError, Event, Findings, child};
 use crate::device::gpu::adapters;
+use crate::job::FrameSet;
 use std::ffi::{OsStr, OsString};
 use std::fmt::Write as _;
 use std::fs;
@@ -44,6 +45,8 @@ const SAVE: [&str; 2] = ["encode", "write"];
 struct Input {
     name: String,
     path: PathBuf,
+    /// The numbers of its frames that are rendered, as an option; empty: all.
+    frames: String,
     thesis: Option<[f64; 4]>,
 }
 
@@ -117,7 +120,7 @@ fn inputs(bench: &Bench) -> Result<Vec<Input>, BenchError> {
             let _ = writeln!(text, "  - {{frames: {frame}-{frame}, ambient: {ambient:.4}}}");
         }
         fs::write(&job, text)?;
-        inputs.push(Input { name: name.to_string(), path: job, thesis: Some(thesis) });
+        inputs.push(Input { name: name.to_string(), path: job, frames: String::new(), thesis: Some(thesis) });
     }
     let folders =
         bench.options.scenes.iter().filter_map(|folder| fs::read_dir(folder).ok()).flatten().flatten();
@@ -131,7 +134,10 @@ fn inputs(bench: &Bench) -> Result<Vec<Input>, BenchError> {
     sequences.push(folder);
     for path in sequences {
         let name = path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
-        inputs.push(Input { name, path, thesis: None });
+        let pictures = bench.job(&path, None)?.pictures;
+        let numbers: Vec<i64> = pictures.iter().take(FRAMES).filter_map(|p| p.frame).collect();
+        let frames = FrameSet::from_numbers(&numbers).to_string();
+        inputs.push(Input { name, path, frames, thesis: None });
     }
     let step = if bench.options.quick { 4 } else { 1 };
     Ok(inputs.into_iter().step_by(step).collect())
@@ -143,6 +149,9 @@ fn measured(bench: &Bench, input: &Input, device: &str) -> Result<Option<[Cell; 
     let run = |kept: bool| {
         let cache: OsString = if kept { store.clone().into() } else { "--no-cache".into() };
         let mut options: Vec<&OsStr> = ["--size", "1280x720", "--device", device].map(OsStr::new).to_vec();
+        if !input.frames.is_empty() {
+            options.extend(["--frames", &input.frames].map(OsStr::new));
+        }
         if kept {
             options.push(OsStr::new("--cache"));
         }
