@@ -279,8 +279,13 @@ pub(super) fn poses([around, down]: [u32; 2]) -> Vec<Frame> {
             })
         })
         .collect();
+    moving(&plain(positions, triangles))
+}
+
+/// A mesh with one material, flat.
+pub(super) fn plain(positions: Vec<[f32; 3]>, triangles: Vec<[u32; 3]>) -> Geometry {
     let count = triangles.len() as u32;
-    let geometry = Geometry {
+    Geometry {
         positions: Part::new(Positions(positions)),
         faces: Part::new(Faces { counts: vec![3; count as usize], corners: triangles.concat() }),
         triangles: Part::new(Triangles(triangles)),
@@ -290,8 +295,7 @@ pub(super) fn poses([around, down]: [u32; 2]) -> Vec<Frame> {
         material_runs: Part::new(MaterialRuns(vec![[0, 0]])),
         materials: vec![Part::new(Material::default())],
         meshes: vec![Mesh { first_face: 0, face_count: count, first_triangle: 0, triangle_count: count }],
-    };
-    moving(&geometry)
+    }
 }
 
 /// A mesh as waves run through it, as in the peer's script.

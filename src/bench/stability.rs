@@ -2,6 +2,7 @@
 //! methods fail, and what is left of it here.
 
 use super::chart::{Chart, Line, Panel};
+use super::frames::plain;
 use super::scenes::scenes;
 use super::sequences::{HOSTILE, TWIST};
 use super::table::{Cell, Table};
@@ -14,10 +15,7 @@ use crate::kernel::camera::{CameraConstants, camera_ray};
 use crate::math::{DVec3, Vec3};
 use crate::plan::{Wishes, plan_frame};
 use crate::run::{RunOptions, Sources, read_frame, read_shot};
-use crate::scene::{
-    Aov, AovSet, Background, Camera, Faces, Falloff, Filter, Frame, Geometry, Light, Material, MaterialRuns,
-    Mesh, Object, Part, Positions, Shot, Triangles,
-};
+use crate::scene::{Aov, AovSet, Background, Camera, Falloff, Filter, Frame, Geometry, Light, Object, Shot};
 use crate::warning::Warnings;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -249,7 +247,7 @@ fn place(
     let wrong = both.filter(is_wrong).count();
     let lost = hits.iter().zip(home).filter(|(a, b)| a.map(|h| h.triangle) != b.map(|h| h.triangle)).count();
     let (_, eye, look_at) = mesh.at(scale, extents);
-    let (dark, ns) = dark(bench, &frame(positions, mesh.triangles.clone()), eye, look_at).map_err(failed)?;
+    let (dark, ns) = dark(bench, plain(positions, mesh.triangles.clone()), eye, look_at).map_err(failed)?;
     let percent = |n: usize, of: usize| 100.0 * n as f64 / of.max(1) as f64;
     Ok(Found { wrong: percent(wrong, rays.len()), lost: percent(lost, rays.len()), acne: dark, ns })
 }
@@ -259,33 +257,16 @@ fn failed(error: DeviceError) -> BenchError {
     BenchError::Frame(error.to_string())
 }
 
-/// A mesh with one material, flat.
-fn frame(positions: Vec<[f32; 3]>, triangles: Vec<[u32; 3]>) -> Frame {
-    let count = triangles.len() as u32;
-    let corners = triangles.as_flattened().to_vec();
-    let geometry = Geometry {
-        positions: Part::new(Positions(positions)),
-        faces: Part::new(Faces { counts: vec![3; triangles.len()], corners }),
-        triangles: Part::new(Triangles(triangles)),
-        texcoords: None,
-        normals: None,
-        colors: None,
-        material_runs: Part::new(MaterialRuns(vec![[0, 0]])),
-        materials: vec![Part::new(Material::default())],
-        meshes: vec![Mesh { first_face: 0, face_count: count, first_triangle: 0, triangle_count: count }],
-    };
-    Frame { objects: vec![Object { geometry: Arc::new(geometry), transform: None }] }
-}
-
 /// The percentage of pixels that show something and are dark with the light in the eye, where none may be; and ns a pixel.
-fn dark(bench: &Bench, frame: &Frame, eye: Vec3, look_at: Vec3) -> Result<(f64, f64), DeviceError> {
+fn dark(bench: &Bench, geometry: Geometry, eye: Vec3, look_at: Vec3) -> Result<(f64, f64), DeviceError> {
+    let frame = Frame { objects: vec![Object { geometry: Arc::new(geometry), transform: None }] };
     let shot = shot(eye, look_at, LIT);
     let no_threads =
         |e: rayon::ThreadPoolBuildError| DeviceError::Lost { device: "cpu".to_string(), why: e.to_string() };
     let mut device = CpuDevice::new(bench.options.threads, u64::MAX).map_err(no_threads)?;
-    let plan = plan_frame(frame, device.residency(), &Wishes::default());
-    device.apply(&plan, frame)?;
-    let traced = device.trace(frame, &shot, &Stop::default())?;
+    let plan = plan_frame(&frame, device.residency(), &Wishes::default());
+    device.apply(&plan, &frame)?;
+    let traced = device.trace(&frame, &shot, &Stop::default())?;
     let film = traced.film.into_film();
     let depth = film.aovs.depth.unwrap_or_default();
     let seen = depth.iter().filter(|d| d.is_finite()).count();
