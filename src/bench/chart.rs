@@ -102,6 +102,8 @@ impl Panel {
         let points = || self.lines.iter().flat_map(|line| line.points.iter());
         let least = points().map(|p| p.1).fold(f64::INFINITY, f64::min);
         let greatest = points().map(|p| p.1).fold(f64::NEG_INFINITY, f64::max);
+        // without points there is nothing to hold
+        let [least, greatest] = if least.is_finite() { [least, greatest] } else { [1.0; 2] };
         let last = points().map(|p| p.0).fold(1.0, f64::max);
         // the names stand beside the lines: so much of the width is theirs
         let longest = self.lines.iter().map(|line| line.name.chars().count()).max().unwrap_or(0);
@@ -109,7 +111,7 @@ impl Panel {
         let more = share.min(0.6) / (1.0 - share.min(0.6));
         let mut builder = ChartBuilder::on(area);
         builder.margin(12).x_label_area_size(36).y_label_area_size(64);
-        let [low, high] = [least.min(greatest) / 1.1, greatest.max(least) * 1.1];
+        let [low, high] = [least / 1.1, greatest * 1.1];
         let (log_y, y) =
             ((low.max(1e-9)..high).log_scale(), 0.0..if greatest > 0.0 { greatest * 1.1 } else { 1.0 });
         if self.is_log_x {
