@@ -68,8 +68,8 @@ fn pictures_are_the_same_whatever_the_store_holds() {
 
     assert!(shown(t, &input, "first", &[]).0 == without);
     let kept = entries(&store);
-    // a texture, a tree, and the shape in the file that was read first
-    assert_eq!(kept.len(), 3, "{kept:?}");
+    // a texture, a tree, the shape in the file that was read first, and the rates of the host and of the device
+    assert_eq!(kept.len(), 5, "{kept:?}");
     assert!(shown(t, &input, "second", &[]).0 == without);
     assert_eq!(entries(&store), kept);
 
@@ -149,9 +149,9 @@ fn cache_tells_and_clears() {
         serde_json::from_str(&run.stdout).unwrap()
     };
     let bytes: u64 = entries(&t.join("store")).iter().map(|p| p.metadata().unwrap().len()).sum();
-    assert_eq!((&told("stat")["entries"], &told("stat")["bytes"]), (&3.into(), &bytes.into()));
+    assert_eq!((&told("stat")["entries"], &told("stat")["bytes"]), (&5.into(), &bytes.into()));
     assert_eq!(told("gc")["removed"]["entries"], 0);
-    assert_eq!((&told("clear")["removed"]["entries"], &told("stat")["entries"]), (&3.into(), &0.into()));
+    assert_eq!((&told("clear")["removed"]["entries"], &told("stat")["entries"]), (&5.into(), &0.into()));
     // what another put there is not touched
     std::fs::write(t.join("store/mine.txt"), "kept").unwrap();
     told("clear");
