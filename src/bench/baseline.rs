@@ -6,8 +6,9 @@ use std::collections::BTreeMap;
 use std::fmt;
 use std::path::Path;
 
-/// A column whose times are so many times as long, all of its rows together, is slower.
-const COLUMN: f64 = 1.2;
+/// A column whose times are so many times as long, all of its rows together, is slower. On a machine that others use quick runs
+/// one after the other differed by up to 1.38.
+const COLUMN: f64 = 1.4;
 /// A single row: so many times, and no run of it as fast as the slowest before.
 const ROW: f64 = 1.6;
 
@@ -130,7 +131,7 @@ mod tests {
         assert!(told(then(), &then()).is_empty());
         assert!(told(then(), &result(10.0, [11.0, 115.0])).is_empty(), "noise");
         assert!(told(then(), &result(10.0, [5.0, 50.0])).is_empty(), "faster");
-        assert_eq!(told(then(), &result(10.0, [14.0, 140.0])), ["w: t: a, ms is slower: 1.40 times as long"]);
+        assert_eq!(told(then(), &result(10.0, [15.0, 150.0])), ["w: t: a, ms is slower: 1.50 times as long"]);
         // a machine that is half as fast explains twice the time
         assert!(told(then(), &result(20.0, [20.0, 200.0])).is_empty());
         assert_eq!(told(then(), &result(20.0, [40.0, 400.0])).len(), 1);
