@@ -271,9 +271,15 @@ pub fn bench(
     let mut slower = Vec::new();
     let mut is_compared = false;
     for workload in workloads {
-        let pace = [pace::pace_ms(bench.options.threads)];
-        let found = (workload.run)(&bench, on_event)?;
-        let pace_ms = pace.into_iter().chain([pace::pace_ms(bench.options.threads)]).sum::<f64>() / 2.0;
+        let mut paces = Vec::new();
+        let found = (workload.run)(&bench, &mut |event| {
+            if matches!(event, Event::Stage(_)) {
+                paces.push(pace::pace_ms(bench.options.threads));
+            }
+            on_event(event);
+        })?;
+        // of many moments: in a single one the machine may be busy with something else
+        let pace_ms = Spread::of(paces).map_or(0.0, |spread| spread.median);
         let folder = &bench.options.folder;
         let json = serde_json::json!({
             "rentix": env!("CARGO_PKG_VERSION"), "workload": workload.name, "machine": machine::machine(),
