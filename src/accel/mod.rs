@@ -16,7 +16,7 @@ mod collapse;
 mod fit;
 mod fit_lanes;
 mod interval;
-mod lanes;
+pub(crate) mod lanes;
 mod origin;
 mod packed;
 mod packet;

@@ -278,8 +278,8 @@ pub fn bench(
             }
             on_event(event);
         })?;
-        // of many moments: in a single one the machine may be busy with something else
-        let pace_ms = Spread::of(paces).map_or(0.0, |spread| spread.median);
+        // the best of many moments: in a single one the machine may be busy with something else
+        let pace_ms = Spread::of(paces).map_or(0.0, |spread| spread.least);
         let folder = &bench.options.folder;
         let json = serde_json::json!({
             "rentix": env!("CARGO_PKG_VERSION"), "workload": workload.name, "machine": machine::machine(),

@@ -2,7 +2,7 @@
 //!
 //! The checks are assertions: they panic, naming what is wrong, where a device does not conform.
 
-use super::{Device, DeviceError, Stop};
+use super::{Device, DeviceError, Output, Stop};
 use crate::film::Film;
 use crate::math::{DAffine3, DVec3, Vec3};
 use crate::plan::{Action, Residency, Step, Wishes, plan_frame};
@@ -32,6 +32,7 @@ pub fn check(make: Make) {
     a_frame_without_objects_is_background(make);
     a_stopped_trace_says_so(make);
     a_frame_that_is_not_resident_is_refused(make);
+    codes_are_those_of_the_linear_film(make);
 }
 
 /// Two devices that promise the same bytes draw the same pictures.
@@ -185,6 +186,24 @@ fn a_frame_without_objects_is_background(make: Make) {
     };
     assert!(film.rgb.iter().all(is_background), "an empty frame does not show the background");
     assert!(film.aovs.id.is_none_or(|ids| ids.iter().all(|id| *id == [u32::MAX; 2])));
+}
+
+/// Whether a device makes them or leaves them to the film.
+fn codes_are_those_of_the_linear_film(make: Make) {
+    let frame = &frames()[1];
+    let mut device = make(AMPLE_BYTES);
+    picture(&mut *device, frame);
+    for alpha in [false, true] {
+        let shot = Shot { alpha, ..shot() };
+        let linear = device.trace(frame, &shot, &Stop::default()).expect("it is resident").film.into_film();
+        for exposure_stops in [0.0, 2.25, -1.5] {
+            let output = Output::Codes { exposure_stops };
+            device.begin(frame, &shot, output, &Stop::default()).expect("it is resident");
+            let film = device.finish().expect("a frame was begun").film.into_film();
+            let is_same = film.codes(true, exposure_stops) == linear.codes(true, exposure_stops);
+            assert!(is_same && film.aovs == linear.aovs, "alpha {alpha}, {exposure_stops} stops");
+        }
+    }
 }
 
 fn a_stopped_trace_says_so(make: Make) {

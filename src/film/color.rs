@@ -51,7 +51,7 @@ const FIRST_BUCKET: u32 = LEAST.to_bits() >> BUCKET_SHIFT;
 const BUCKETS: usize = 13 * 128 + 1;
 
 /// The codes of a bucket's floats.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Debug)]
 struct Bucket {
     /// Bits of the least float with the code after `code`.
     next: u32,
@@ -63,6 +63,7 @@ struct Bucket {
 ///
 /// The curve never climbs more than one code within a bucket (steepest against the bucket's width just above 0.5,
 /// where a bucket is 1/256 wide and the curve gains 0.66 codes in it), so that one comparison finds the code.
+#[derive(Debug)]
 pub struct Srgb8([Bucket; BUCKETS]);
 
 impl Srgb8 {

@@ -84,6 +84,12 @@ impl Film {
         Self { rgb: vec![[0.0; 3]; n], ..Self::without_rgb(size, alpha, aovs) }
     }
 
+    /// A black film of codes.
+    pub fn new_codes(size: [u32; 2], aovs: AovSet) -> Self {
+        let n = size[0] as usize * size[1] as usize;
+        Self { codes: Some(vec![0; 3 * n]), ..Self::without_rgb(size, false, aovs) }
+    }
+
     /// The same before its colour is there.
     pub fn without_rgb(size: [u32; 2], alpha: bool, aovs: AovSet) -> Self {
         let n = size[0] as usize * size[1] as usize;

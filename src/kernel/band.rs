@@ -1,6 +1,43 @@
 //! Disjoint rows of a film, so that threads fill it without locks.
 
-use crate::film::Film;
+use crate::film::{Film, Srgb8};
+
+/// Where colour goes.
+#[derive(Debug)]
+pub enum Color<'a> {
+    /// As [`Film::rgb`].
+    Linear(&'a mut [[f32; 3]]),
+    /// As [`Film::codes`].
+    Codes {
+        /// Three codes a pixel.
+        all: &'a mut [[u8; 3]],
+        /// What makes them of light,
+        curve: &'static Srgb8,
+        /// after this factor.
+        gain: f32,
+    },
+}
+
+impl Color<'_> {
+    fn len(&self) -> usize {
+        match self {
+            Self::Linear(rgb) => rgb.len(),
+            Self::Codes { all, .. } => all.len(),
+        }
+    }
+
+    /// Puts linear light at a place.
+    #[inline]
+    pub fn put(&mut self, place: usize, rgb: [f32; 3]) {
+        match self {
+            Self::Linear(all) => all[place] = rgb,
+            Self::Codes { all, curve, gain } => {
+                let [r, g, b] = rgb;
+                all[place] = [curve.code(r * *gain), curve.code(g * *gain), curve.code(b * *gain)];
+            }
+        }
+    }
+}
 
 /// Some whole rows of a film with its auxiliary pictures.
 #[derive(Debug)]
@@ -11,8 +48,8 @@ pub struct FilmBand<'a> {
     pub rows: u32,
     /// Pixels a row.
     pub width: u32,
-    /// As [`Film::rgb`].
-    pub rgb: &'a mut [[f32; 3]],
+    /// Its colour.
+    pub color: Color<'a>,
     /// As [`Film::alpha`].
     pub alpha: Option<&'a mut [f32]>,
     /// As [`crate::film::Aovs::depth`].
@@ -50,8 +87,9 @@ impl FilmBand<'_> {
     }
 }
 
-/// Cuts a film into bands of `rows` rows (1 or more); the last may have fewer.
-pub fn bands(film: &mut Film, rows: u32) -> Vec<FilmBand<'_>> {
+/// Cuts a film into bands of `rows` rows (1 or more); the last may have fewer. Colour is multiplied by `gain` where it is
+/// stored as codes.
+pub fn bands(film: &mut Film, rows: u32, gain: f32) -> Vec<FilmBand<'_>> {
     let width = film.size[0];
     let pixels = width as usize * rows as usize;
     let aovs = &mut film.aovs;
@@ -64,14 +102,21 @@ pub fn bands(film: &mut Film, rows: u32) -> Vec<FilmBand<'_>> {
     let mut material = aovs.material.as_mut().map(|p| p.chunks_mut(pixels));
     let mut uv = aovs.uv.as_mut().map(|p| p.chunks_mut(pixels));
     let mut coverage = aovs.coverage.as_mut().map(|p| p.chunks_mut(pixels));
-    film.rgb
-        .chunks_mut(pixels)
-        .enumerate()
-        .map(|(i, rgb)| FilmBand {
-            first_row: i as u32 * rows,
-            rows: rgb.len() as u32 / width,
+    let colors: Vec<Color> = match &mut film.codes {
+        Some(codes) => {
+            let curve = Srgb8::table();
+            let codes = codes.as_chunks_mut().0.chunks_mut(pixels);
+            codes.map(|all| Color::Codes { all, curve, gain }).collect()
+        }
+        None => film.rgb.chunks_mut(pixels).map(Color::Linear).collect(),
+    };
+    (0..)
+        .zip(colors)
+        .map(|(i, color)| FilmBand {
+            first_row: i * rows,
+            rows: color.len() as u32 / width,
             width,
-            rgb,
+            color,
             alpha: alpha.as_mut().and_then(Iterator::next),
             depth: depth.as_mut().and_then(Iterator::next),
             normal: normal.as_mut().and_then(Iterator::next),

@@ -3,6 +3,7 @@
 //! Plain functions over records of four-float rows, one file for each part of the shading; the same operations in
 //! the same order whatever the tile or the thread, so that a pixel is a function of frame and shot alone.
 
+pub mod aim;
 pub mod band;
 pub mod branch;
 pub mod camera;

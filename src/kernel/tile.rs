@@ -2,15 +2,15 @@
 //! at a time, so that neighbours share what they touch. What a pixel becomes depends on no other pixel.
 
 use super::RayCounts;
+use super::aim::aim;
 use super::band::FilmBand;
 use super::branch::{Border, Branches, Visit};
-use super::camera::camera_ray;
 use super::center::fill_center;
 use super::direct::{Constants, Sample, Shading, ShadowRays, add_lights};
 use super::material::{HALO, MaterialRecord, TEXTURED};
 use super::optics::reflectance_upright;
 use super::path::{Path, PixelSum};
-use super::sampler::place_in_pixel;
+use super::sampler::Places;
 use super::scene::Scene;
 use super::shade::{Reflected, color};
 use crate::accel::{Aggregate, Hit, Ray};
@@ -23,6 +23,8 @@ use std::ops::Range;
 pub struct TileBuffers {
     /// (column, row in the band).
     pixels: Vec<[u32; 2]>,
+    /// The point of the picture that each camera ray goes through.
+    points: Vec<[f32; 2]>,
     /// The ray of each pixel's path.
     rays: Vec<Ray>,
     hits: Vec<Option<Hit>>,
@@ -54,9 +56,7 @@ pub fn trace_tile<A: Aggregate>(
         if stopped() {
             return None;
         }
-        buffers.aim(scene, band, |pixel| {
-            place_in_pixel(scene.shot.filter, sample, samples, pixel, scene.shot.seed)
-        });
+        buffers.aim(scene, band, Places::new(scene.shot.filter, sample, samples, scene.shot.seed));
         buffers.trace(scene, &mut counts);
         buffers.start(scene);
         for step in 0.. {
@@ -74,7 +74,7 @@ pub fn trace_tile<A: Aggregate>(
     }
     if band.wants_center() {
         // of a single sample the hits are those of these rays, but mirrored rays may have taken their places
-        buffers.aim(scene, band, |_| [0.5; 2]);
+        buffers.aim(scene, band, Places::middle());
         if samples > 1 {
             buffers.trace(scene, &mut counts);
         }
@@ -105,14 +105,10 @@ fn list_pixels(rows: u32, columns: &Range<u32>, pixels: &mut Vec<[u32; 2]>) {
 }
 
 impl TileBuffers {
-    /// Camera rays through the given place in each pixel.
-    fn aim<A>(&mut self, scene: &Scene<A>, band: &FilmBand, place: impl Fn([u32; 2]) -> [f32; 2]) {
-        self.rays.clear();
-        self.rays.extend(self.pixels.iter().map(|&[x, row]| {
-            let y = band.first_row + row;
-            let [u, v] = place([x, y]);
-            camera_ray(&scene.camera, x as f32 + u, y as f32 + v)
-        }));
+    /// Camera rays through these places.
+    fn aim<A>(&mut self, scene: &Scene<A>, band: &FilmBand, places: Places) {
+        let Self { pixels, points, rays, .. } = self;
+        aim(&scene.camera, places, band.first_row, pixels, points, rays);
     }
 
     /// The first hit of each camera ray.
@@ -234,7 +230,7 @@ impl TileBuffers {
         let samples = shot.samples as f32;
         for (&pixel, sum) in self.pixels.iter().zip(&self.sums) {
             let place = band.place(pixel);
-            band.rgb[place] = (sum.rgb / samples).into();
+            band.color.put(place, (sum.rgb / samples).into());
             if let Some(alpha) = &mut band.alpha {
                 alpha[place] = 1.0 - sum.through / samples;
             }

@@ -80,13 +80,13 @@ impl Device for CpuDevice {
         self.resident.apply(plan, frame, &self.pool, &self.info)
     }
 
-    fn begin(&mut self, frame: &Frame, shot: &Shot, _output: Output, stop: &Stop) -> Result<(), DeviceError> {
+    fn begin(&mut self, frame: &Frame, shot: &Shot, output: Output, stop: &Stop) -> Result<(), DeviceError> {
         let scene = self
             .resident
             .scene(frame)
             .map_err(|object| DeviceError::NotResident { device: self.info.name.clone(), object })?
             .with_width(self.width);
-        self.traced = Some(self.pool.install(|| trace::trace(&scene, frame, shot, stop))?);
+        self.traced = Some(self.pool.install(|| trace::trace(&scene, frame, shot, output, stop))?);
         Ok(())
     }
 

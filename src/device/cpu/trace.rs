@@ -2,8 +2,8 @@
 
 use crate::accel::TracedScene;
 use crate::clock::Stopwatch;
-use crate::device::{DeviceError, RayCounts, Spans, Stop, Traced};
-use crate::film::Film;
+use crate::device::{DeviceError, Output, RayCounts, Spans, Stop, Traced};
+use crate::film::{Film, gain_from_stops};
 use crate::kernel::{FilmBand, Scene, TileBuffers, bands, trace_tile};
 use crate::scene::{Frame, Shot};
 use rayon::prelude::*;
@@ -18,12 +18,19 @@ pub(super) fn trace(
     scene: &TracedScene,
     frame: &Frame,
     shot: &Shot,
+    output: Output,
     stop: &Stop,
 ) -> Result<Traced, DeviceError> {
     let start = Stopwatch::start();
     let scene = Scene::new(scene, frame, shot);
-    let mut film = Film::new(shot.size, shot.alpha, shot.aovs);
-    let rays = bands(&mut film, BAND_ROWS)
+    let (mut film, gain) = match output {
+        // colour is to be straight where there is alpha
+        Output::Codes { exposure_stops } if !shot.alpha => {
+            (Film::new_codes(shot.size, shot.aovs), gain_from_stops(exposure_stops))
+        }
+        _ => (Film::new(shot.size, shot.alpha, shot.aovs), 1.0),
+    };
+    let rays = bands(&mut film, BAND_ROWS, gain)
         .into_par_iter()
         .map_init(TileBuffers::default, |buffers, band| trace_band(&scene, band, buffers, stop))
         .try_reduce(RayCounts::default, |mut sum, counts| {

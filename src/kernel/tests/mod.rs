@@ -105,7 +105,7 @@ fn render_in_tiles(frame: &Frame, shot: &Shot, rows: u32, columns: u32) -> (Film
     let mut film = Film::new(shot.size, shot.alpha, shot.aovs);
     let mut counts = RayCounts::default();
     let mut buffers = TileBuffers::default();
-    for mut band in bands(&mut film, rows) {
+    for mut band in bands(&mut film, rows, 1.0) {
         for left in (0..shot.size[0]).step_by(columns as usize) {
             let columns = left..shot.size[0].min(left + columns);
             counts += trace_tile(&scene, &mut band, columns, &mut buffers, &|| false).unwrap();
@@ -392,6 +392,6 @@ fn a_stopped_tile_says_so() {
     let aggregate = traced_scene(&frame);
     let scene = Scene::new(&aggregate, &frame, &shot);
     let mut film = Film::new(shot.size, false, shot.aovs);
-    let mut bands = bands(&mut film, 8);
+    let mut bands = bands(&mut film, 8, 1.0);
     assert_eq!(trace_tile(&scene, &mut bands[0], 0..5, &mut TileBuffers::default(), &|| true), None);
 }
