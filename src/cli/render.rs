@@ -28,9 +28,9 @@ pub(super) fn render(args: &RenderArgs, global: &Global) -> Result<ExitCode> {
     let for_people = matches!(args.progress, ProgressKind::Auto | ProgressKind::Bar | ProgressKind::Plain);
     let kind = if json || global.quiet && for_people { ProgressKind::None } else { args.progress };
     let mut progress = Progress::new(kind, global.verbose);
-    if args.movie.is_some() {
+    if let Some(file) = &args.movie {
         // told before the work, not after it
-        movie_can_be_made()?;
+        movie_can_be_made(file, args.overwrite)?;
     }
     let stop = stop::on_signals()?;
     let outcome = run::render(&job, &options, &fleet, &stop.asked, &mut |event| {
@@ -47,19 +47,21 @@ pub(super) fn render(args: &RenderArgs, global: &Global) -> Result<ExitCode> {
     let status = conclude(&job, &outcome, global, &stop);
     match &args.movie {
         Some(file) if !outcome.stopped && outcome.failed().next().is_none() => {
-            make_movie(&job, file, args.fps.unwrap_or(FPS))?;
+            if let Err(error) = make_movie(&job, file) {
+                eprintln!("error: {error}");
+                let is_stopped = stop.asked.asked();
+                return Ok(ExitCode::from(if is_stopped { stop.exit_status() } else { EXIT_FAILED }));
+            }
             if !global.quiet && !global.json {
                 eprintln!("{}", file.display());
             }
         }
+        Some(file) if outcome.stopped => eprintln!("{}: no film is made of a part", file.display()),
         Some(file) => eprintln!("{}: no film is made, for frames are missing", file.display()),
         None => {}
     }
     Ok(status)
 }
-
-/// Frames a second of a film, as of animations.
-const FPS: f64 = 24.0;
 
 /// What of the options bears on the run itself.
 pub(super) fn run_options(args: &RenderArgs) -> RunOptions {

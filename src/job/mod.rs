@@ -83,6 +83,8 @@ pub struct Job {
     pub inputs: Vec<PathBuf>,
     /// Jobs of higher priority come first with the daemon; None: nothing is said.
     pub priority: Option<i64>,
+    /// Frames a second, of glTF files and of a film.
+    pub fps: f64,
     /// What is wrong but stops nothing.
     pub warnings: Warnings,
 }

@@ -54,9 +54,10 @@ pub fn resolve(request: &Request) -> Result<Job, JobError> {
     let stem = files.first().map(|p| p.file_stem().unwrap_or_default().to_string_lossy().into_owned());
     let of_job = job_file.name.clone().or(stem);
     let mut name = of_job.clone();
+    let taking = Resolving::taking(request, &job_file);
+    let fps = taking.fps;
     if job_file.layers.is_empty() {
         let own: Vec<&PathBuf> = job_file.sequence.iter().collect();
-        let taking = Resolving::taking(request, &job_file);
         for input in if inputs.is_empty() { own } else { inputs } {
             for files in discover::discover(input, taking, &mut job.warnings)? {
                 job.add_sequence(of_job.as_deref(), files, &job_file)?;
@@ -88,6 +89,7 @@ pub fn resolve(request: &Request) -> Result<Job, JobError> {
         pictures: job.pictures,
         inputs: job.inputs,
         priority: job_file.priority,
+        fps,
         warnings: job.warnings,
     })
 }

@@ -2,7 +2,8 @@
 
 use crate::job::Job;
 use std::fmt::Write as _;
-use std::io;
+use std::fs::File;
+use std::io::{self, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
@@ -12,6 +13,14 @@ pub enum MovieError {
     /// ffmpeg cannot be started.
     #[error("no film can be made: ffmpeg {0}; install it (https://ffmpeg.org), or leave --movie out")]
     NoProgram(String),
+    /// It would be made where it cannot be.
+    #[error("{}: no film can be made there: {why}", .file.display())]
+    Place {
+        /// The film.
+        file: PathBuf,
+        /// What is wrong, and what helps.
+        why: &'static str,
+    },
     /// There is no room.
     #[error("{}: the film cannot be written: {why}; the pictures are there", .file.display())]
     Room {
@@ -30,11 +39,27 @@ pub enum MovieError {
     },
 }
 
-/// Whether ffmpeg can be started.
+/// Stands in each film, and tells it from files that others made.
+const MARK: &str = "made by rentix";
+/// So much of a file's beginning and end is looked at for the mark: formats have it with what is said of the whole.
+const LOOK: usize = 1 << 20;
+
+/// Whether ffmpeg can be started, and its film may stand there.
 ///
 /// # Errors
-/// Where it cannot.
-pub fn movie_can_be_made() -> Result<(), MovieError> {
+/// Where not: there is no such folder, no ending that tells the format, or a file that is no film of this program and is not to
+/// be written over.
+pub fn movie_can_be_made(file: &Path, overwrite: bool) -> Result<(), MovieError> {
+    let place = |why| Err(MovieError::Place { file: file.to_path_buf(), why });
+    if !folder_of(file).is_dir() {
+        return place("there is no such folder; make it first");
+    }
+    if file.extension().is_none() {
+        return place("its ending tells no format; name it FILE.mp4");
+    }
+    if !overwrite && file.symlink_metadata().is_ok() && !is_ours(file) {
+        return place("the file there was not made by rentix; --overwrite replaces it");
+    }
     let started = Command::new("ffmpeg").arg("-version").stdin(Stdio::null()).output();
     match started {
         Ok(output) if output.status.success() => Ok(()),
@@ -46,15 +71,37 @@ pub fn movie_can_be_made() -> Result<(), MovieError> {
     }
 }
 
-/// Makes a film of a job's pictures by their sequences and numbers, so many a second. The file is whole or absent.
+fn folder_of(file: &Path) -> &Path {
+    file.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."))
+}
+
+/// Whether a file has the mark; what cannot be read has none.
+fn is_ours(file: &Path) -> bool {
+    let has_mark = |bytes: &[u8]| bytes.windows(MARK.len()).any(|w| w == MARK.as_bytes());
+    let Ok(mut opened) = File::open(file) else { return false };
+    let mut part = Vec::new();
+    let begins = opened.by_ref().take(LOOK as u64).read_to_end(&mut part).is_ok() && has_mark(&part);
+    part.clear();
+    begins
+        || opened.metadata().is_ok_and(|m| {
+            let from = m.len().saturating_sub(LOOK as u64);
+            opened.seek(SeekFrom::Start(from)).is_ok()
+                && opened.read_to_end(&mut part).is_ok()
+                && has_mark(&part)
+        })
+}
+
+/// Makes a film of a job's pictures by their sequences and numbers, as many a second as the job says. The file is whole or
+/// absent.
 ///
 /// # Errors
 /// Where ffmpeg says so, or there is no room.
-pub fn make_movie(job: &Job, file: &Path, fps: f64) -> Result<(), MovieError> {
+pub fn make_movie(job: &Job, file: &Path) -> Result<(), MovieError> {
+    let fps = job.fps;
     let room = |why: io::Error| MovieError::Room { file: file.to_path_buf(), why };
-    let folder = file.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
     // on the same file system, so that it can take the film's place
-    let unfinished = tempfile::Builder::new().prefix(".rentix-movie-").tempdir_in(folder).map_err(room)?;
+    let unfinished =
+        tempfile::Builder::new().prefix(".rentix-movie-").tempdir_in(folder_of(file)).map_err(room)?;
     let mut pictures: Vec<_> = job.pictures.iter().collect();
     pictures.sort_by_key(|p| (p.sequence, p.frame));
     let mut list = "ffconcat version 1.0\n".to_string();
@@ -75,6 +122,7 @@ pub fn make_movie(job: &Job, file: &Path, fps: f64) -> Result<(), MovieError> {
         .arg(&list_file)
         // players know this one; it needs even sizes
         .args(["-vf", "pad=ceil(iw/2)*2:ceil(ih/2)*2", "-pix_fmt", "yuv420p", "-r", &fps.to_string()])
+        .args(["-metadata", &format!("comment={MARK}")])
         .arg(&made)
         .output()
         .map_err(room)?;
