@@ -437,7 +437,7 @@ fn a_gpu_that_hangs_is_given_up() {
         let mut gpu = open(&adapter.clone().patient(Duration::ZERO));
         let plan = plan_frame(frame, gpu.residency(), &Wishes::default());
         let hangs = gpu.apply(&plan, frame).and_then(|_| gpu.trace(frame, shot, &Stop::default())).err();
-        let says = |error: &DeviceError| error.to_string().contains("it hangs: nothing came of 0 s");
+        let says = |error: &DeviceError| error.to_string().contains("it hangs: nothing came of 0ns");
         assert!(hangs.as_ref().is_some_and(says), "{}: {hangs:?}", adapter.name());
         assert!(gpu.residency().held.is_empty(), "it is left, with what it held");
 

@@ -35,8 +35,13 @@ pub(super) fn inspect(args: &RenderArgs, global: &Global) -> Result<ExitCode> {
     let mut before: Option<(usize, Frame)> = None;
     let sources = Sources::default();
     let store = store_of(args);
-    let devices: Vec<DeviceInfo> =
-        devices(args, store.clone())?.iter().map(|device| device.info().clone()).collect();
+    let devices: Vec<DeviceInfo> = match devices(args, store.clone()) {
+        Ok(devices) => devices.iter().map(|device| device.info().clone()).collect(),
+        Err(error) => {
+            say(global, &format!("warning: no costs are told, for no device can be opened: {error:#}"));
+            Vec::new()
+        }
+    };
     for (i, picture) in job.pictures.iter().enumerate() {
         let is_last = job.pictures.get(i + 1).is_none_or(|next| next.sequence != picture.sequence);
         match read_frame(&job, picture, &sources, args.lenient, &mut warnings) {

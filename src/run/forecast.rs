@@ -59,8 +59,15 @@ pub fn forecast(
     let first = DeviceWork { uploaded: parts, built: triangles, ..tracing };
     let is_built = change.reshaped + change.added > 0;
     let is_moved = change.deformed > 0;
+    let positions = || frame.objects.iter().map(|o| size_of_val(&*o.geometry.positions.0) as u64).sum();
     let next = DeviceWork {
-        uploaded: if is_built || is_moved { parts } else { 0 },
+        uploaded: if is_built {
+            parts
+        } else if is_moved {
+            positions()
+        } else {
+            0
+        },
         built: if is_built { triangles } else { 0 },
         refitted: if is_moved && !is_built { triangles } else { 0 },
         ..tracing

@@ -281,7 +281,10 @@ impl Gpu {
             Ok(_) => return Ok(()),
             Err(wgpu::PollError::Timeout) => {
                 self.hangs.store(true, Ordering::Relaxed);
-                format!("it hangs: nothing came of {} s of waiting", self.patience.as_secs())
+                format!(
+                    "it hangs: nothing came of {:?} of waiting; end what else uses it, or name another by --device",
+                    self.patience
+                )
             }
             Err(error) => error.to_string(),
         };
