@@ -7,13 +7,13 @@ use super::sequences::TWIST;
 use super::table::{Cell, Table};
 use super::times::Spread;
 use super::{Bench, BenchError, Event, Findings};
-use crate::device::{Device, Stop, registry};
+use crate::device::{Device, DeviceKind, Stop};
 use crate::film::compare::{Channel, Picture, Samples, compare};
 use crate::plan::{Wishes, plan_frame};
-use crate::run::{RunOptions, machine, read_shot};
+use crate::run::{PICTURE_VERSION, RunOptions, read_shot};
 use crate::scene::{Filter, Frame, PartHasher, Shot};
 use crate::store::{DEFAULT_LIMIT_BYTES, Key, Payload, Store};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 const SIZE: [u32; 2] = [320, 180];
 /// Samples, bounces and seed of the reference, and its pruning: with none at all a ray that meets glass at each bounce would
@@ -39,6 +39,8 @@ struct Point {
     knob: &'static str,
     to: String,
     is_default: bool,
+    /// Whether more samples would make the reference of it.
+    is_of_reference: bool,
     ms: Spread,
     rmse: f64,
     flip: f64,
@@ -50,7 +52,10 @@ struct Point {
 pub(super) fn accuracy(bench: &Bench, on_event: &mut dyn FnMut(&Event<'_>)) -> Result<Findings, BenchError> {
     let mut all = Table::new(
         "accuracy",
-        "What a picture of 320x180 costs and how far it is from the reference (4096 samples, 16 bounces, pruned at 1/65536): root mean square of linear differences, mean FLIP; 1 where something is both faster and more exact by more than noise.",
+        format!(
+            "What a picture of 320x180 costs and how far it is from the reference ({} samples, box filter, 16 bounces, pruned at 1/65536): root mean square of linear differences, mean FLIP; 1 where something is both faster and more exact by more than noise. Other filters make another picture of many samples: they take no part in that.",
+            reference_samples(bench)
+        ),
         &["trace, ms", "RMSE", "FLIP", "beaten"],
     );
     let mut defaults = Table::new(
@@ -59,9 +64,16 @@ pub(super) fn accuracy(bench: &Bench, on_event: &mut dyn FnMut(&Event<'_>)) -> R
         &["1 sample, ms", "RMSE", "beaten by", "16 samples, ms", "RMSE ", "beaten by "],
     );
     let mut found = Findings::default();
-    let mut device = opened(bench)?;
-    for (name, frame, shot) in inputs(bench)? {
+    let mut device = bench.device()?;
+    for (name, path) in inputs(bench)? {
         on_event(&Event::Stage(&name));
+        let (frame, shot) = match first_frame(bench, &path) {
+            Ok(shown) => shown,
+            Err(why) => {
+                on_event(&Event::LeftOut(&name, &why));
+                continue;
+            }
+        };
         let points = measured(bench, &mut *device, &frame, &shot)?;
         for p in &points {
             let beaten = f64::from(u8::from(p.is_beaten));
@@ -83,37 +95,29 @@ pub(super) fn accuracy(bench: &Bench, on_event: &mut dyn FnMut(&Event<'_>)) -> R
     Ok(found)
 }
 
-fn opened(bench: &Bench) -> Result<Box<dyn Device>, BenchError> {
-    let wanted = registry::Wanted {
-        threads: bench.options.threads,
-        budget_bytes: None,
-        host_budget_bytes: machine::default_budget_bytes(),
-        store: None,
-    };
-    Ok(registry::open(bench.options.device.as_deref(), &wanted)?)
-}
-
-/// Scenes with their first frames, and a made one where there are none.
-fn inputs(bench: &Bench) -> Result<Vec<(String, Frame, Shot)>, BenchError> {
+/// Scenes, and a made one where there are none.
+fn inputs(bench: &Bench) -> Result<Vec<(String, PathBuf)>, BenchError> {
     let made = bench.room.path().join("made sheet");
     let mut all = scenes(bench.options.scenes.as_deref());
     all.retain(|scene| !scene.path.components().any(|c| c.as_os_str() == "torture"));
-    let mut paths: Vec<(String, &Path)> = all.iter().map(|s| (s.name.clone(), &*s.path)).collect();
+    let mut paths: Vec<(String, PathBuf)> = all.into_iter().map(|s| (s.name, s.path)).collect();
     if paths.is_empty() {
         TWIST.write(40, 2, &made)?;
-        paths.push(("made sheet".to_string(), &made));
+        paths.push(("made sheet".to_string(), made));
     }
     if bench.options.quick {
         paths.truncate(3);
     }
-    let shown = |(name, path): (String, &Path)| {
-        let mut job = bench.job(path, None)?;
-        job.pictures.truncate(1);
-        let options = RunOptions { threads: bench.options.threads, lenient: true, ..RunOptions::default() };
-        let (frame, shot) = read_shot(&job, &options).map_err(BenchError::Frame)?;
-        Ok((name, frame, Shot { size: SIZE, ..shot }))
-    };
-    paths.into_iter().map(shown).collect()
+    Ok(paths)
+}
+
+/// A scene's first frame; or why it cannot be read.
+fn first_frame(bench: &Bench, path: &Path) -> Result<(Frame, Shot), String> {
+    let mut job = bench.job(path, None).map_err(|e| e.to_string())?;
+    job.pictures.truncate(1);
+    let options = RunOptions { threads: bench.options.threads, lenient: true, ..RunOptions::default() };
+    let (frame, shot) = read_shot(&job, &options)?;
+    Ok((frame, Shot { size: SIZE, ..shot }))
 }
 
 /// What is tried; the first ones are the default with more and more samples.
@@ -160,11 +164,12 @@ fn measured(
     let failed = |e: crate::device::DeviceError| BenchError::Frame(e.to_string());
     let plan = plan_frame(frame, device.residency(), &Wishes::default());
     device.apply(&plan, frame).map_err(failed)?;
+    let kind = device.info().kind;
     let mut trace = |shot: &Shot| {
         let traced = device.trace(frame, shot, &Stop::default()).map_err(failed)?;
         Ok::<_, BenchError>((traced.trace_ms, traced.film.into_film().rgb))
     };
-    let reference = reference(bench, frame, shot, &mut trace)?;
+    let reference = reference(bench, kind, frame, shot, &mut trace)?;
     let methods = methods(shot, bench.options.quick);
     let mut times = vec![Vec::new(); methods.len()];
     let mut films = Vec::new();
@@ -189,6 +194,7 @@ fn measured(
             knob: method.knob,
             to: method.to.clone(),
             is_default: method.knob == "samples",
+            is_of_reference: method.shot.filter == shot.filter,
             ms: Spread::of(times)?,
             rmse: compared.rmse,
             flip: compared.flip,
@@ -217,7 +223,11 @@ fn beats(a: &Point, b: &Point) -> bool {
         (a.ms.greatest < b.ms.least * (1.0 - NOISE), a.ms.median <= b.ms.median * (1.0 + NOISE));
     let exacter = a.rmse < b.rmse * (1.0 - NOISE) && a.flip < b.flip * (1.0 - NOISE);
     let as_exact = a.rmse <= b.rmse && a.flip <= b.flip;
-    as_fast && exacter || faster && as_exact
+    a.is_of_reference && b.is_of_reference && (as_fast && exacter || faster && as_exact)
+}
+
+fn reference_samples(bench: &Bench) -> u32 {
+    if bench.options.quick { QUICK_SAMPLES } else { REFERENCE.0 }
 }
 
 type Trace<'a> = &'a mut dyn FnMut(&Shot) -> Result<(f64, Vec<[f32; 3]>), BenchError>;
@@ -225,15 +235,17 @@ type Trace<'a> = &'a mut dyn FnMut(&Shot) -> Result<(f64, Vec<[f32; 3]>), BenchE
 /// The picture that more work would make, from the store where it is there.
 fn reference(
     bench: &Bench,
+    kind: DeviceKind,
     frame: &Frame,
     shot: &Shot,
     trace: Trace<'_>,
 ) -> Result<Vec<[f32; 3]>, BenchError> {
-    let (samples, depth, seed) = REFERENCE;
-    let samples = if bench.options.quick { QUICK_SAMPLES } else { samples };
-    let shot = Shot { samples, depth, seed, prune: REFERENCE_PRUNE, ..shot.clone() };
+    let (_, depth, seed) = REFERENCE;
+    let shot =
+        Shot { samples: reference_samples(bench), depth, seed, prune: REFERENCE_PRUNE, ..shot.clone() };
     let mut hasher = PartHasher::new("reference");
-    hasher.bytes(env!("CARGO_PKG_VERSION").as_bytes());
+    hasher.u64(PICTURE_VERSION);
+    hasher.bytes(kind.word().as_bytes());
     hasher.part(frame.hash());
     shot.hash_into(&mut hasher);
     let key = Key(hasher.finish().0);
@@ -258,7 +270,7 @@ fn chart(name: &str, points: &[Point]) -> Chart {
     let least = points.iter().map(|p| p.rmse).filter(|e| *e > 0.0).fold(1.0, f64::min) / 2.0;
     let place = |p: &Point| (p.ms.median, p.rmse.max(least));
     let mut lines: Vec<Line> = Vec::new();
-    let mut frontier: Vec<&Point> = points.iter().filter(|p| !p.is_beaten).collect();
+    let mut frontier: Vec<&Point> = points.iter().filter(|p| p.is_of_reference && !p.is_beaten).collect();
     frontier.sort_by(|a, b| a.ms.median.total_cmp(&b.ms.median));
     for knob in knobs {
         let points = points.iter().filter(|p| p.knob == knob).map(place).collect();

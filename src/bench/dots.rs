@@ -10,7 +10,8 @@ use std::error::Error;
 const WIDTH: u32 = 900;
 const ROW: i32 = 20;
 const TOP: i32 = 62;
-const LEFT: i32 = 190;
+/// Width of a letter of the rows' names, at most.
+const LETTER: i32 = 8;
 const RIGHT: i32 = 880;
 
 /// A chart of some columns of a table.
@@ -41,11 +42,13 @@ fn draw(
         || (0..table.rows.len()).flat_map(|row| columns.iter().filter_map(move |(c, _)| value(row, *c)));
     let first = all().fold(f64::INFINITY, f64::min).min(1e9).log10().floor();
     let last = all().fold(0.0, f64::max).max(1e-9).log10().ceil().max(first + 1.0);
-    let x = |value: f64| LEFT + (f64::from(RIGHT - LEFT) * (value.log10() - first) / (last - first)) as i32;
+    let longest = table.rows.iter().map(|(name, _)| name.chars().count()).max().unwrap_or(0);
+    let left = 16 + LETTER * longest as i32;
+    let x = |value: f64| left + (f64::from(RIGHT - left) * (value.log10() - first) / (last - first)) as i32;
     let bottom = TOP + ROW * table.rows.len() as i32;
 
     root.draw(&Text::new(title.to_string(), (12, 16), text(20, HPos::Left)))?;
-    let mut from = LEFT;
+    let mut from = left;
     for (i, (_, name)) in columns.iter().enumerate() {
         root.draw(&Circle::new((from, 42), 5, COLORS[i % COLORS.len()].filled()))?;
         root.draw(&Text::new((*name).to_string(), (from + 10, 42), text(14, HPos::Left)))?;
@@ -63,13 +66,13 @@ fn draw(
     }
     root.draw(&Text::new(
         unit.to_string(),
-        (i32::midpoint(LEFT, RIGHT), bottom + 32),
+        (i32::midpoint(left, RIGHT), bottom + 32),
         text(14, HPos::Center),
     ))?;
     for (row, (name, _)) in table.rows.iter().enumerate() {
         let y = TOP + ROW * row as i32 + ROW / 2;
-        root.draw(&Text::new(name.clone(), (LEFT - 8, y), text(13, HPos::Right)))?;
-        root.draw(&PathElement::new(vec![(LEFT, y), (RIGHT, y)], BLACK.mix(0.08)))?;
+        root.draw(&Text::new(name.clone(), (left - 8, y), text(13, HPos::Right)))?;
+        root.draw(&PathElement::new(vec![(left, y), (RIGHT, y)], BLACK.mix(0.08)))?;
         for (i, (column, _)) in columns.iter().enumerate() {
             if let Some(value) = value(row, *column) {
                 root.draw(&Circle::new((x(value), y), 5, COLORS[i % COLORS.len()].filled()))?;

@@ -23,26 +23,34 @@ pub(super) fn estimates(bench: &Bench, on_event: &mut dyn FnMut(&Event<'_>)) -> 
     let mut table = Table::new(
         "estimates",
         format!(
-            "How far off estimates are on the device {}, %, 640x360: of a warm frame's time on the device before the first frame, and after ten (median over frames); of what the device holds; of the process's memory. Thesis: its start and render over ours, times.",
+            "How far off estimates are on the device {}, %, 640x360: before the first frame, of what a warm frame takes to trace; after ten frames, of its whole time on the device (median over frames); of what the device holds; of the process's memory. Thesis: its start and render over ours, times.",
             bench.options.device.as_deref().unwrap_or("that is best")
         ),
         &[
             "triangles",
-            "warm, ms",
-            "off before, %",
-            "off after 10, %",
+            "trace, ms",
+            "trace off before, %",
+            "frame off after 10, %",
             "held, MB",
-            "off before, %",
-            "off after 10, %",
+            "held off before, %",
+            "held off after 10, %",
             "process, MB",
-            "off before, %",
+            "process off before, %",
             "thesis, times",
         ],
     );
     let mut all: [Vec<f64>; 6] = Default::default();
+    // those of an earlier run may be of other scenes
+    let _ = fs::remove_dir_all(bench.options.folder.join(REPORTS));
     for input in &inputs {
         on_event(&Event::Stage(&input.name));
-        let Some(cells) = measured(bench, input)? else { continue };
+        let cells = match measured(bench, input)? {
+            Ok(cells) => cells,
+            Err(why) => {
+                on_event(&Event::LeftOut(&input.name, &why));
+                continue;
+            }
+        };
         for (all, column) in all.iter_mut().zip([2, 3, 5, 6, 8, 9]) {
             all.extend(cells[column].value());
         }
@@ -55,8 +63,8 @@ pub(super) fn estimates(bench: &Bench, on_event: &mut dyn FnMut(&Event<'_>)) -> 
     Ok(found)
 }
 
-/// A row; None where nothing can be rendered. Each scene has a process of its own, for its memory's sake.
-fn measured(bench: &Bench, input: &Scene) -> Result<Option<[Cell; 10]>, BenchError> {
+/// A row; or why nothing can be rendered. Each scene has a process of its own, for its memory's sake.
+fn measured(bench: &Bench, input: &Scene) -> Result<Result<[Cell; 10], String>, BenchError> {
     let reports = bench.options.folder.join(REPORTS);
     fs::create_dir_all(&reports)?;
     let rates = bench.room.path().join("rates");
@@ -65,11 +73,14 @@ fn measured(bench: &Bench, input: &Scene) -> Result<Option<[Cell; 10]>, BenchErr
     if let Some(name) = &bench.options.device {
         options.extend(["--device", name].map(OsStr::new));
     }
-    let report = reports.join(format!("{}.json", input.name));
-    let Some(report) = child::render(bench, &input.path, &report, &options)? else { return Ok(None) };
+    let report = reports.join(format!("{}.json", input.name.replace('/', "-")));
+    let report = match child::render(bench, &input.path, &report, &options)? {
+        Ok(report) => report,
+        Err(why) => return Ok(Err(why)),
+    };
     let number = |value: &Value, path: &str| value.pointer(path).and_then(Value::as_f64);
     let frames = child::rendered(&report);
-    let Some(&first) = frames.first() else { return Ok(None) };
+    let first = frames[0];
     let off = |expected: Option<f64>, is: Option<f64>| Some(100.0 * (expected? / is? - 1.0).abs());
     let median = |values: &mut dyn Iterator<Item = Option<f64>>| {
         Spread::of(values.flatten().collect()).map(|spread| spread.median)
@@ -86,10 +97,14 @@ fn measured(bench: &Bench, input: &Scene) -> Result<Option<[Cell; 10]>, BenchErr
 
     let job = bench.job(&input.path, None)?;
     let (sources, warnings) = (Sources::default(), &mut Warnings::default());
-    let frame = read_frame(&job, &job.pictures[0], &sources, true, warnings).map_err(BenchError::Frame)?;
+    // the first that can be read, as the report's
+    let read = |picture| read_frame(&job, picture, &sources, true, warnings).ok();
+    let Some(frame) = job.pictures.iter().find_map(read) else {
+        return Ok(Err("no frame can be read again".to_string()));
+    };
     let vertices: usize = frame.objects.iter().map(|o| o.geometry.positions.0.len()).sum();
     let thesis = Thesis::new(vertices as u64, frame.texture_bytes() as f64 / 1e6);
-    Ok(Some([
+    Ok(Ok([
         number(first, "/triangles").into(),
         warm_ms.into(),
         off(number(first, "/predicted_ms/trace"), warm_ms).into(),

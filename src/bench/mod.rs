@@ -39,9 +39,9 @@ pub use mitsuba::Mitsuba;
 pub use table::{Cell, Table};
 pub use times::Spread;
 
-use crate::device::Stop;
 use crate::device::cpu::CpuDevice;
-use crate::device::registry::RegistryError;
+use crate::device::registry::{self, RegistryError};
+use crate::device::{Device, Stop};
 use crate::job::{self, Job, JobError, Options, Request};
 use crate::math::Vec3;
 use crate::output::{OutputError, write_atomic};
@@ -155,6 +155,8 @@ pub enum Event<'a> {
     Stage(&'a str),
     /// A table is complete.
     Table(&'a Table),
+    /// An input is left out, and why.
+    LeftOut(&'a str, &'a str),
 }
 
 /// Why a benchmark did not come to its end.
@@ -226,6 +228,23 @@ impl Bench {
         if self.options.quick { rounds.div_ceil(4) } else { rounds }
     }
 
+    /// What results must have in common to be compared.
+    fn settings(&self) -> serde_json::Value {
+        let BenchOptions { quick, threads, device, .. } = &self.options;
+        serde_json::json!({"quick": quick, "threads": threads, "device": device})
+    }
+
+    /// The device that was named, else the best there is.
+    fn device(&self) -> Result<Box<dyn Device>, BenchError> {
+        let wanted = registry::Wanted {
+            threads: self.options.threads,
+            budget_bytes: None,
+            host_budget_bytes: machine::default_budget_bytes(),
+            store: None,
+        };
+        Ok(registry::open(self.options.device.as_deref(), &wanted)?)
+    }
+
     fn wants(&self, table: &str) -> bool {
         self.options.only.is_empty() || self.options.only.iter().any(|name| name == table)
     }
@@ -262,33 +281,36 @@ pub fn bench(
     baseline: Option<&Path>,
     on_event: &mut dyn FnMut(&Event<'_>),
 ) -> Result<Vec<Slower>, BenchError> {
-    let before = baseline.map(Baseline::read).transpose()?;
     let bench = Bench { options, room: tempfile::tempdir()? };
-    // told before the work, not after it
+    // what cannot end well is told before the work, not after it
+    let before = baseline.map(|path| Baseline::read(path, &bench.settings(), workloads)).transpose()?;
+    if bench.options.device.is_some() {
+        bench.device()?;
+    }
     create_dir_all(&bench.options.folder)?;
     let peers = peers::installed(bench.options.embree.as_deref());
     let mut page = Page::new(&bench, &peers);
     let mut slower = Vec::new();
-    let mut is_compared = false;
     for workload in workloads {
         let mut paces = Vec::new();
-        let found = (workload.run)(&bench, &mut |event| {
+        let mut found = (workload.run)(&bench, &mut |event| {
             if matches!(event, Event::Stage(_)) {
                 paces.push(pace::pace_ms(bench.options.threads));
             }
-            on_event(event);
+            if !matches!(event, Event::Table(table) if !bench.wants(table.name)) {
+                on_event(event);
+            }
         })?;
+        found.tables.retain(|table| bench.wants(table.name));
         // the best of many moments: in a single one the machine may be busy with something else
         let pace_ms = Spread::of(paces).map_or(0.0, |spread| spread.least);
         let folder = &bench.options.folder;
         let json = serde_json::json!({
             "rentix": env!("CARGO_PKG_VERSION"), "workload": workload.name, "machine": machine::machine(),
-            "quick": bench.options.quick, "threads": bench.options.threads, "pace_ms": pace_ms,
-            "peers": peers, "tables": found.tables,
+            "settings": bench.settings(), "pace_ms": pace_ms, "peers": peers, "tables": found.tables,
         });
         if let Some(before) = before.as_ref().filter(|before| before.is_of(workload.name)) {
-            is_compared = true;
-            slower.extend(before.slower(&json));
+            slower.extend(before.slower(&json)?);
         }
         let json = serde_json::to_vec_pretty(&json).unwrap_or_default();
         write_atomic(&folder.join(format!("{}.json", workload.name)), &json)?;
@@ -296,13 +318,8 @@ pub fn bench(
             write_atomic(&folder.join(format!("{name}.svg")), svg.as_bytes())?;
         }
         page.add(workload, &found);
+        // after each: a later one may not come to its end
+        write_atomic(&folder.join("report.html"), page.html(&slower).as_bytes())?;
     }
-    if let Some(path) = baseline.filter(|_| !is_compared) {
-        return Err(BenchError::Baseline(
-            path.display().to_string(),
-            "it is of a workload that was not run".to_string(),
-        ));
-    }
-    write_atomic(&bench.options.folder.join("report.html"), page.html(&slower).as_bytes())?;
     Ok(slower)
 }

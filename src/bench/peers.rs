@@ -11,7 +11,7 @@ pub(super) struct Peer {
     pub(super) name: &'static str,
     /// What it is compared by.
     pub(super) role: &'static str,
-    /// Its version.
+    /// Its version; of Embree the program that was made of it, which tells its version with its figures.
     pub(super) version: Option<String>,
 }
 

@@ -27,7 +27,7 @@ pub(super) fn policy(bench: &Bench, inputs: &[Input]) -> Result<(Table, Vec<Char
     let mut table = Table::new(
         "policy",
         "Updating and tracing whole sequences, ms: the policy against always refitting and always rebuilding; medians of rounds in turn.",
-        &["frames", "auto", "refit", "rebuild", "auto/better", "refits", "builds", "cost ratio"],
+        &["frames", "auto, ms", "refit, ms", "rebuild, ms", "auto/better", "refits", "builds", "cost ratio"],
     );
     let mut charts = Vec::new();
     let mut sums = [0.0; 3];

@@ -30,18 +30,23 @@ fn job(report: &Path) -> Option<TraceJob> {
     let frames = child::rendered(&report);
     let seconds = |f: &Value, of: &str, terms: &[&str]| child::sum_ms(f, of, terms) / 1e3;
     let first = frames.first()?;
-    let warm = frames.iter().filter(|f| f["warm"] == true);
-    let warm = Spread::of(warm.map(|f| seconds(f, "ms", &["upload", "update", "trace"])).collect());
-    let warm_s = warm.map_or_else(|| seconds(first, "ms", &["trace"]), |spread| spread.median);
+    let warm = |terms: &[&str]| {
+        let warm = frames.iter().filter(|f| f["warm"] == true);
+        let spread = Spread::of(warm.map(|f| seconds(f, "ms", terms)).collect());
+        spread.map_or_else(|| seconds(first, "ms", &["trace"]), |spread| spread.median)
+    };
     let cold_s = seconds(first, "ms", &["read", "parse", "upload", "update"]);
     let thought = |terms: &[&str], is: f64| (seconds(first, "predicted_ms", terms) / is.max(1e-9)).max(1e-3);
     Some(TraceJob {
         arrives_s: 0.0,
         frames: frames.len() as u64,
-        warm_s,
+        warm_s: warm(&["upload", "update", "trace"]),
         cold_s,
         bytes: report["devices"][0]["resident"]["peak"].as_u64()?,
-        seen: [thought(&["trace"], warm_s), thought(&["read", "parse", "upload", "update"], cold_s)],
+        seen: [
+            thought(&["trace"], warm(&["trace"])),
+            thought(&["read", "parse", "upload", "update"], cold_s),
+        ],
         deadline_s: None,
     })
 }

@@ -9,15 +9,15 @@ const LEAST_BYTES: u64 = 20_000;
 /// An input.
 #[derive(Clone, Debug)]
 pub(super) struct Scene {
-    /// The name of its file or folder.
+    /// Its path within the folder of scenes, with `/`.
     pub(super) name: String,
     pub(super) path: PathBuf,
 }
 
 /// All of them, mixed: neighbours in the alphabet are alike.
-pub(super) fn scenes(folder: Option<&Path>) -> Vec<Scene> {
+pub(super) fn scenes(root: Option<&Path>) -> Vec<Scene> {
     let mut paths = Vec::new();
-    for folder in folder.map(list).unwrap_or_default() {
+    for folder in root.map(list).unwrap_or_default() {
         if folder.file_name().is_some_and(|n| n.to_string_lossy().starts_with("seq-")) {
             paths.push(folder);
             continue;
@@ -32,7 +32,10 @@ pub(super) fn scenes(folder: Option<&Path>) -> Vec<Scene> {
     let count = paths.len();
     let stride = (0..count).rev().find(|s| s % 7 == 3 && gcd(*s, count) == 1).unwrap_or(1);
     let scene = |path: &PathBuf| Scene {
-        name: path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default(),
+        name: root
+            .map_or(&**path, |root| path.strip_prefix(root).unwrap_or(path))
+            .to_string_lossy()
+            .replace('\\', "/"),
         path: path.clone(),
     };
     (0..count).map(|i| scene(&paths[i * stride % count])).collect()

@@ -1,6 +1,6 @@
 //! The workload `schedule`: rules that share frames out, simulated on made traces, and on those that the workload `estimates`
-//! left in the same folder. Nothing is timed but decisions; the rest
-//! is the same on every machine.
+//! left in the same folder. Nothing is timed but decisions; made
+//! traces are the same on every machine.
 
 use super::chart::{Chart, Line, Panel};
 use super::table::{Cell, Table};

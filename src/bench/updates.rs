@@ -11,9 +11,8 @@ use super::trees::{EMBREE_REFIT_1, Mesh, trees};
 use super::view::View;
 use super::warm::{WarmPeers, warm_frames};
 use super::{Bench, BenchError, Event, Findings};
-use crate::device::{DeviceKind, registry};
+use crate::device::DeviceKind;
 use crate::format::{ReadOptions, TextureCache, load_obj};
-use crate::run::machine;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -100,13 +99,7 @@ fn devices(
     findings: &mut Findings,
     on_event: &mut dyn FnMut(&Event<'_>),
 ) -> Result<(), BenchError> {
-    let wanted = registry::Wanted {
-        threads: bench.options.threads,
-        budget_bytes: None,
-        host_budget_bytes: machine::default_budget_bytes(),
-        store: None,
-    };
-    let mut device = registry::open(bench.options.device.as_deref(), &wanted)?;
+    let mut device = bench.device()?;
     if bench.options.quick && bench.options.only.is_empty() && device.info().kind != DeviceKind::Gpu {
         // they are tables of GPUs: on a CPU they take minutes
         return Ok(());

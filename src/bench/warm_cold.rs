@@ -38,7 +38,7 @@ const MADE_FRAMES: u32 = 9;
 /// Terms of a frame's time: before the device, on it in the first frame and in another, and after it.
 const START: [&str; 2] = ["read", "parse"];
 const FIRST: [&str; 3] = ["upload", "update", "trace"];
-const AFTER: [&str; 4] = ["diff", "upload", "update", "trace"];
+const AFTER: [&str; 6] = ["read", "parse", "diff", "upload", "update", "trace"];
 const SAVE: [&str; 2] = ["encode", "write"];
 
 /// What is rendered, and the thesis's figures for it.
@@ -54,7 +54,7 @@ struct Input {
 pub(super) fn warm_cold(bench: &Bench, on_event: &mut dyn FnMut(&Event<'_>)) -> Result<Findings, BenchError> {
     let mut table = Table::new(
         "warm-cold",
-        "A frame, 1280x720, one sample, each run in a process of its own: start (reading, parsing), and with a warm store; the first frame on the device; a frame after it; saving; cold over warm: (start + first)/after. Beside it the thesis's figures for its scenes on its machine of 2012.",
+        "A frame, 1280x720, one sample, each run in a process of its own: start (reading, parsing), and with a warm store; the first frame on the device; a frame after it, its own reading included; saving; cold over warm: (start + first)/after. Beside it the thesis's figures for its scenes on its machine of 2012.",
         &[
             "start, ms",
             "with store, ms",
@@ -77,8 +77,9 @@ pub(super) fn warm_cold(bench: &Bench, on_event: &mut dyn FnMut(&Event<'_>)) -> 
             let name =
                 if devices.len() == 1 { input.name.clone() } else { format!("{}, {device}", input.name) };
             on_event(&Event::Stage(&name));
-            if let Some(cells) = measured(bench, &input, device)? {
-                table.row(name, cells);
+            match measured(bench, &input, device)? {
+                Ok(cells) => table.row(name, cells),
+                Err(why) => on_event(&Event::LeftOut(&name, &why)),
             }
         }
     }
@@ -143,8 +144,8 @@ fn inputs(bench: &Bench) -> Result<Vec<Input>, BenchError> {
     Ok(inputs.into_iter().step_by(step).collect())
 }
 
-/// A row; None where nothing is rendered.
-fn measured(bench: &Bench, input: &Input, device: &str) -> Result<Option<[Cell; 13]>, BenchError> {
+/// A row; or why nothing is rendered.
+fn measured(bench: &Bench, input: &Input, device: &str) -> Result<Result<[Cell; 13], String>, BenchError> {
     let store = bench.room.path().join("store");
     let run = |kept: bool| {
         let cache: OsString = if kept { store.clone().into() } else { "--no-cache".into() };
@@ -160,17 +161,22 @@ fn measured(bench: &Bench, input: &Input, device: &str) -> Result<Option<[Cell; 
     };
     let mut ms: [Vec<f64>; 5] = Default::default();
     let mut bytes: [Vec<f64>; 2] = Default::default();
-    run(true)?;
+    if let Err(why) = run(true)? {
+        return Ok(Err(why));
+    }
     for _ in 0..bench.rounds(8).max(3) {
-        let Some(report) = run(false)? else { return Ok(None) };
-        let Some(with_store) = run(true)? else { return Ok(None) };
-        let frames = child::rendered(&report);
-        let (Some(first), kept) = (frames.first(), child::rendered(&with_store)) else { return Ok(None) };
-        let Some(kept) = kept.first() else { return Ok(None) };
+        let (report, with_store) = match (run(false)?, run(true)?) {
+            (Ok(report), Ok(with_store)) => (report, with_store),
+            (Err(why), _) | (_, Err(why)) => return Ok(Err(why)),
+        };
+        let (frames, kept) = (child::rendered(&report), child::rendered(&with_store));
+        let (first, kept) = (frames[0], kept[0]);
         let after = frames.iter().skip(1).map(|f| child::sum_ms(f, "ms", &AFTER)).collect();
         let save = frames.iter().map(|f| child::sum_ms(f, "ms", &SAVE)).collect();
         let medians = [after, save].map(|all| Spread::of(all).map(|s| s.median));
-        let [Some(after), Some(save)] = medians else { return Ok(None) };
+        let [Some(after), Some(save)] = medians else {
+            return Ok(Err("no frame follows the first one".to_string()));
+        };
         let of_first = [
             child::sum_ms(first, "ms", &START),
             child::sum_ms(kept, "ms", &START),
@@ -187,7 +193,7 @@ fn measured(bench: &Bench, input: &Input, device: &str) -> Result<Option<[Cell; 
         _ => Cell::Absent,
     };
     let then = |i: usize| input.thesis.map(|t| t[i] * 1e3);
-    Ok(Some([
+    Ok(Ok([
         start,
         kept,
         first,

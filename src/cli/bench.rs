@@ -38,7 +38,7 @@ pub(super) struct BenchArgs {
     /// The variant of Mitsuba that it runs
     #[arg(long, value_name = "NAME", default_value = "cuda_ad_rgb")]
     mitsuba_variant: String,
-    /// The device of the tables frames, refit and rays [default: the best there is]
+    /// The device to measure; needs and stability are of the CPU [default: the best there is]
     #[arg(long, value_name = "NAME")]
     device: Option<String>,
     /// NAME.json of an earlier run: what is slower now is named, and the exit status is 1
@@ -65,7 +65,11 @@ pub(super) fn bench(args: &BenchArgs, global: &Global) -> Result<ExitCode> {
         only: args.only.clone(),
         threads: args.threads.map_or_else(|| machine::machine().cores, usize::from),
     };
-    let is_asked = |w: &Workload| args.names.is_empty() || args.names.iter().any(|name| name == w.name);
+    let is_asked = |w: &Workload| {
+        let has_table = args.only.iter().any(|table| w.tables.contains(&table.as_str()));
+        (args.names.is_empty() || args.names.iter().any(|name| name == w.name))
+            && (args.only.is_empty() || has_table)
+    };
     let workloads: Vec<Workload> = WORKLOADS.into_iter().filter(is_asked).collect();
     let slower = bench::bench(&workloads, options, args.baseline.as_deref(), &mut |event| match event {
         Event::Stage(what) if !(global.quiet || global.json) => eprintln!("{what} ..."),
@@ -74,6 +78,7 @@ pub(super) fn bench(args: &BenchArgs, global: &Global) -> Result<ExitCode> {
             println!("{}", serde_json::to_value(table).unwrap_or_default());
         }
         Event::Table(table) => println!("{table}"),
+        Event::LeftOut(what, why) => eprintln!("{what} is left out: {why}"),
     })?;
     for one in &slower {
         eprintln!("{one}");

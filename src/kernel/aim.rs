@@ -1,6 +1,8 @@
 //! The camera rays of one sample of many pixels: where samples lie costs as much as a ray, if it is not computed side by
 //! side.
 
+#![allow(clippy::inline_always, reason = "what is not inlined is not compiled for the lanes' CPU feature")]
+
 use super::camera::{CameraConstants, camera_ray};
 use super::sampler::Places;
 use crate::accel::Ray;

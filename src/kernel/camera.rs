@@ -47,6 +47,7 @@ impl CameraConstants {
 }
 
 /// The ray through (x, y) of the picture, in pixels from its upper left corner; its direction is unit.
+#[allow(clippy::inline_always, reason = "what is not inlined is not compiled for the lanes' CPU feature")]
 #[inline(always)]
 pub fn camera_ray(c: &CameraConstants, x: f32, y: f32) -> Ray {
     let direction = c.forward + c.right * (x - c.center_x) + c.down * (y - c.center_y);

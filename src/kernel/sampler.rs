@@ -3,6 +3,8 @@
 //!
 //! Scrambling by hashes: Brent Burley, "Practical Hash-based Owen Scrambling", JCGT 9(4), 2020.
 
+#![allow(clippy::inline_always, reason = "what is not inlined is not compiled for the lanes' CPU feature")]
+
 use crate::scene::Filter;
 
 /// Half the gaussian filter's width in units of σ·√2: radius 1.5, σ 0.5.

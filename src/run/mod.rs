@@ -25,7 +25,7 @@ pub use event::{Event, FrameReport, Status};
 pub use fleet::Fleet;
 pub use forecast::{Forecast, forecast};
 pub use movie::{MovieError, make_movie, movie_can_be_made};
-pub use read::{read_frame, read_shot};
+pub use read::{PICTURE_VERSION, read_frame, read_shot};
 pub use report::{DeviceReport, Report, Totals};
 pub use source::Sources;
 

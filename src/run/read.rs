@@ -22,7 +22,7 @@ use std::sync::Arc;
 use std::sync::mpsc::Sender;
 
 /// Changes whenever the same inputs may give other pixels, so that pictures of other versions are made anew.
-const PICTURE_VERSION: u64 = 5;
+pub const PICTURE_VERSION: u64 = 5;
 
 /// A frame that was read and must be traced.
 pub(super) struct ReadFrame {
