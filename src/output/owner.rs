@@ -1,4 +1,5 @@
-//! Names of files that tell which process they belong to: `HOST.PID.N` between a prefix and a suffix.
+//! Names of files that tell which process they belong to: `HOST.PID.START.N` between a prefix and a suffix. START, when the
+//! process began, tells it from a later one of the same number; it is left out where the system does not say.
 
 use crate::clock;
 use std::path::Path;
@@ -12,38 +13,64 @@ const AGE_MAX_NS: u128 = 24 * 3_600 * 1_000_000_000;
 pub fn own_name(prefix: &str, suffix: &str) -> String {
     static NAMES: AtomicU64 = AtomicU64::new(0);
     let n = NAMES.fetch_add(1, Ordering::Relaxed);
-    let host = this_host().unwrap_or("unknown");
-    format!("{prefix}{host}.{}.{n}{suffix}", std::process::id())
+    format!("{prefix}{}.{n}{suffix}", *PROCESS)
 }
+
+/// The first words of all names of this process.
+static PROCESS: LazyLock<String> = LazyLock::new(|| {
+    let (host, pid) = (this_host().unwrap_or("unknown"), std::process::id());
+    process(pid).map_or_else(|| format!("{host}.{pid}"), |(_, start)| format!("{host}.{pid}.{start}"))
+});
 
 /// Whether a file has such a name, and its process is dead (known on this host alone) or it is older than a day.
 pub(super) fn is_dead(path: &Path, prefix: &str, suffix: &str) -> bool {
     let name = path.file_name().and_then(|n| n.to_str());
-    let Some((host, pid)) = name.and_then(|name| owner(name, prefix, suffix)) else { return false };
-    is_gone_from(host, pid) || is_old(path)
+    let Some(owner) = name.and_then(|name| owner(name, prefix, suffix)) else { return false };
+    owner.is_gone() || is_old(path)
 }
 
 /// Whether the process of a name that [`own_name`] made without prefix and suffix has ended; known on this host alone.
 pub fn is_gone(name: &str) -> bool {
-    owner(name, "", "").is_some_and(|(host, pid)| is_gone_from(host, pid))
+    owner(name, "", "").is_some_and(|owner| owner.is_gone())
 }
 
-fn is_gone_from(host: &str, pid: u32) -> bool {
-    this_host() == Some(host) && !is_running(pid)
+/// What a name tells of its process.
+#[derive(Debug, PartialEq)]
+struct Owner<'a> {
+    host: &'a str,
+    pid: u32,
+    start: Option<u64>,
 }
 
-/// A process that has ended and for whose exit status nobody has asked runs no more (proc(5): its state is Z).
-fn is_running(pid: u32) -> bool {
-    let Ok(stat) = std::fs::read_to_string(format!("/proc/{pid}/stat")) else { return false };
-    let state = stat.rsplit(')').next().and_then(|rest| rest.trim_start().chars().next());
-    !matches!(state, Some('Z' | 'X'))
+impl Owner<'_> {
+    fn is_gone(&self) -> bool {
+        this_host() == Some(self.host)
+            && match process(self.pid) {
+                // one that has ended and for whose exit status nobody has asked runs no more
+                Some(('Z' | 'X', _)) | None => true,
+                Some((_, start)) => self.start.is_some_and(|began| began != start),
+            }
+    }
 }
 
-fn owner<'a>(name: &'a str, prefix: &str, suffix: &str) -> Option<(&'a str, u32)> {
-    let mut words = name.strip_prefix(prefix)?.strip_suffix(suffix)?.split('.');
-    let (host, pid) = (words.next()?, words.next()?.parse().ok()?);
-    words.next()?.parse::<u64>().ok()?;
-    words.next().is_none().then_some((host, pid))
+/// The state of a process and when it began, in ticks since the machine did: the 3rd and the 22nd field of proc(5)'s stat. The
+/// second is in brackets and may hold anything.
+fn process(pid: u32) -> Option<(char, u64)> {
+    let stat = std::fs::read_to_string(format!("/proc/{pid}/stat")).ok()?;
+    let mut fields = stat.rsplit(')').next()?.split_ascii_whitespace();
+    let state = fields.next()?.chars().next()?;
+    Some((state, fields.nth(18)?.parse().ok()?))
+}
+
+fn owner<'a>(name: &'a str, prefix: &str, suffix: &str) -> Option<Owner<'a>> {
+    let words: Vec<&str> = name.strip_prefix(prefix)?.strip_suffix(suffix)?.split('.').collect();
+    let (host, pid, start, n) = match words[..] {
+        [host, pid, n] => (host, pid, None, n),
+        [host, pid, start, n] => (host, pid, Some(start.parse().ok()?), n),
+        _ => return None,
+    };
+    n.parse::<u64>().ok()?;
+    Some(Owner { host, pid: pid.parse().ok()?, start })
 }
 
 fn is_old(path: &Path) -> bool {
@@ -91,12 +118,30 @@ pub(super) mod tests {
     fn names_tell_their_process() {
         let (one, two) = (own_name(".a-", ".tmp"), own_name(".a-", ".tmp"));
         assert_ne!(one, two);
-        assert_eq!(owner(&one, ".a-", ".tmp").unwrap().1, std::process::id());
-        for foreign in
-            [".a-h.1.tmp", ".a-h.x.1.tmp", ".a-h.1.1.1.tmp", ".a-h.1.x.tmp", ".b-h.1.1.tmp", ".a-h.1.1"]
-        {
+        assert_eq!(owner(&one, ".a-", ".tmp").unwrap().pid, std::process::id());
+        let without_start = Owner { host: "h", pid: 7, start: None };
+        assert_eq!(owner(".a-h.7.0.tmp", ".a-", ".tmp"), Some(without_start));
+        for foreign in [
+            ".a-h.1.tmp",
+            ".a-h.x.1.tmp",
+            ".a-h.1.1.1.1.tmp",
+            ".a-h.1.x.1.tmp",
+            ".a-h.1.x.tmp",
+            ".b-h.1.1.tmp",
+            ".a-h.1.1",
+        ] {
             assert_eq!(owner(foreign, ".a-", ".tmp"), None, "{foreign}");
         }
+    }
+
+    #[test]
+    #[cfg(target_os = "linux")]
+    fn a_later_process_of_the_same_number_is_another_one() {
+        let own = own_name("", "");
+        assert!(!is_gone(&own));
+        let start = process(std::process::id()).unwrap().1;
+        let earlier = own.replace(&format!(".{start}."), &format!(".{}.", start - 1));
+        assert!(earlier != own && is_gone(&earlier), "{earlier}");
     }
 
     #[test]
