@@ -89,8 +89,9 @@ impl Journal {
 
     /// Begins with what is known, in place of other files.
     fn fold(&mut self, known: &Known, others: &[PathBuf]) -> Result<(), WatchError> {
-        let lines = known.last.iter().rev().map(|status| line(status, None));
-        let text: String = lines.chain(known.due.iter().map(|s| line(s, Some(Notice::Due)))).collect();
+        // the last states last: in one file the later line wins
+        let due = known.due.iter().map(|status| line(status, Some(Notice::Due)));
+        let text: String = due.chain(known.last.iter().rev().map(|status| line(status, None))).collect();
         output::write_atomic(&self.path, text.as_bytes())?;
         for path in others {
             match fs::remove_file(path) {
@@ -162,6 +163,9 @@ fn open(path: &Path) -> std::io::Result<File> {
 struct Gathered {
     /// Of each job the last status.
     last: HashMap<String, Status>,
+    /// The same of the file that is being read, in which a later line wins, whatever its times: a job that is received
+    /// again has none of its own.
+    of_file: HashMap<String, Status>,
     due: HashMap<(String, Option<u64>), Status>,
     told: HashSet<(String, Option<u64>)>,
 }
@@ -179,6 +183,7 @@ impl Gathered {
             let mut line = Vec::new();
             let read = (&mut file).take(LINE_BYTES_MAX).read_until(b'\n', &mut line);
             if read.map_err(cannot("read", path))? == 0 {
+                self.merge();
                 return Ok(());
             }
             // without its line end it is torn
@@ -191,12 +196,23 @@ impl Gathered {
     fn take(&mut self, Line { status, notice }: Line, takes_due: bool) {
         match notice {
             Some(Notice::Due) if takes_due => drop(self.due.insert(end_of(&status), status.clone())),
-            Some(Notice::Told) => drop(self.told.insert(end_of(&status))),
+            // it says nothing of the job, which may have gone on meanwhile
+            Some(Notice::Told) => {
+                self.told.insert(end_of(&status));
+                return;
+            }
             _ => {}
         }
-        let known = self.last.get(&status.job).map(latest);
-        if known.is_none_or(|at| at <= latest(&status)) {
-            self.last.insert(status.job.clone(), status);
+        self.of_file.insert(status.job.clone(), status);
+    }
+
+    /// Takes what the file that was read says last of each job; of several files the later change stands.
+    fn merge(&mut self) {
+        for (job, status) in self.of_file.drain() {
+            let known = self.last.get(&job).map(latest);
+            if known.is_none_or(|at| at <= latest(&status)) {
+                self.last.insert(job, status);
+            }
         }
     }
 
@@ -333,6 +349,27 @@ mod tests {
         fs::remove_dir_all(t.path()).unwrap();
         journal.append(&[status("b", State::Running, 101)]).unwrap();
         assert!(journal.path.exists(), "its folder is made anew");
+    }
+
+    #[test]
+    fn in_one_file_the_later_line_wins() {
+        let t = tempfile::tempdir().unwrap();
+        let (mut journal, _) = Journal::open(t.path(), true).unwrap();
+        let mut end = status("a", State::Finished, 1);
+        end.times.ended_ms = Some(9);
+        // it changed, and is received again before its end was told of
+        journal.append(&[end.clone(), status("a", State::Received, 1)]).unwrap();
+        for told in [false, true] {
+            if told {
+                journal.told(&end).unwrap();
+            }
+            journal.fold_own().unwrap();
+            let mut gathered = Gathered::default();
+            gathered.read(&journal.path, true).unwrap();
+            let known = gathered.known(true);
+            assert_eq!(known.last, [status("a", State::Received, 1)], "told: {told}");
+            assert_eq!(known.due.len(), usize::from(!told));
+        }
     }
 
     /// The name of a journal whose daemon is dead.
