@@ -18,7 +18,7 @@ use std::path::{Path, PathBuf};
 use xxhash_rust::xxh3::xxh3_64;
 
 const SUFFIX: &str = ".log";
-/// Of so many jobs a fold keeps the last state, the latest first.
+/// Of so many jobs a fold keeps the last state, the latest first. Ends that are due are all kept.
 const JOBS_KEPT: usize = 10_000;
 /// After so many bytes a journal is folded, which takes a fifth of a second.
 const BYTES_MAX: u64 = 16 << 20;
@@ -223,7 +223,6 @@ impl Gathered {
         let due = self.due.into_iter().filter(|(end, _)| tells && !self.told.contains(end));
         let mut due: Vec<Status> = due.map(|(_, status)| status).collect();
         due.sort_by_key(latest);
-        due.truncate(JOBS_KEPT);
         Known { last, due }
     }
 }
@@ -349,6 +348,19 @@ mod tests {
         fs::remove_dir_all(t.path()).unwrap();
         journal.append(&[status("b", State::Running, 101)]).unwrap();
         assert!(journal.path.exists(), "its folder is made anew");
+    }
+
+    #[test]
+    fn no_end_that_is_due_is_dropped() {
+        let ends = JOBS_KEPT + 1;
+        let mut gathered = Gathered::default();
+        for n in 0..ends {
+            let status = status(&n.to_string(), State::Finished, 1);
+            gathered.take(Line { status, notice: Some(Notice::Due) }, true);
+        }
+        gathered.merge();
+        let known = gathered.known(true);
+        assert_eq!((known.last.len(), known.due.len()), (JOBS_KEPT, ends));
     }
 
     #[test]

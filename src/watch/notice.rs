@@ -1,5 +1,6 @@
 //! Tells about jobs that finished or failed: a command, a webhook, mail. One thread, one after the other; what cannot be
-//! told is said and stops nothing. Each is told of at least once: what a daemon was killed over, the next one tells again.
+//! told is said and stops nothing. Each is tried at least once, a webhook three times: what a daemon was killed over, the next one
+//! tells again; what was tried in vain is not.
 
 use super::state::Status;
 use super::{Message, WatchError};
@@ -10,7 +11,7 @@ use std::io::Write;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
-use std::sync::mpsc::{Sender, SyncSender, TrySendError, channel, sync_channel};
+use std::sync::mpsc::{Sender, channel};
 use std::time::Duration;
 
 /// Who is told.
@@ -29,8 +30,6 @@ pub struct Notices {
     pub smtp: Option<String>,
 }
 
-/// So many notices wait; more are left to the next daemon, and that is said.
-const WAITING_MAX: usize = 10_000;
 /// A webhook has so long for each attempt.
 const WEBHOOK_WITHIN: Duration = Duration::from_secs(20);
 /// What a command finds in its environment of an error is not longer: systems bound it. The whole is on its standard input.
@@ -42,7 +41,8 @@ const MAIL_WITHIN: Duration = Duration::from_mins(1);
 
 /// The thread that tells.
 pub(super) struct Notifier {
-    waiting: SyncSender<(Status, PathBuf)>,
+    /// One for each end that is due, as the journal keeps them: one that were refused would wait for the next start.
+    waiting: Sender<(Status, PathBuf)>,
 }
 
 struct Mail {
@@ -65,7 +65,7 @@ impl Notifier {
                 "--webhook {url}: is no URL that begins with http:// or https://"
             )));
         }
-        let (waiting, incoming) = sync_channel::<(Status, PathBuf)>(WAITING_MAX);
+        let (waiting, incoming) = channel::<(Status, PathBuf)>();
         let notices = notices.clone();
         // nobody waits for it: what it is about when the daemon ends is due still
         std::thread::spawn(move || {
@@ -86,14 +86,8 @@ impl Notifier {
 
     /// Tells of a job that ended; what is said where that cannot be. A message comes when it was told.
     pub(super) fn tell(&self, status: &Status, folder: &Path) -> Result<(), String> {
-        let why = |error| match error {
-            TrySendError::Full(_) => {
-                format!("{WAITING_MAX} notices wait already; this one waits for the next start")
-            }
-            TrySendError::Disconnected(_) => "nobody tells any more".to_owned(),
-        };
-        let sent = self.waiting.try_send((status.clone(), folder.to_path_buf()));
-        sent.map_err(|error| format!("{}: {}", status.job, why(error)))
+        let sent = self.waiting.send((status.clone(), folder.to_path_buf()));
+        sent.map_err(|_| format!("{}: nobody tells any more; the next start does", status.job))
     }
 }
 
