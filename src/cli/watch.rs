@@ -36,7 +36,7 @@ pub(super) struct WatchArgs {
     /// Serve a status page (also /metrics for Prometheus, /healthz), as 127.0.0.1:8080
     #[arg(long, value_name = "ADDRESS", help_heading = "Watching")]
     pub listen: Option<SocketAddr>,
-    /// Run a command for each job that finished or failed, at least once, one at a time (RENTIX_JOB, RENTIX_STATE, RENTIX_FOLDER, RENTIX_FRAMES, RENTIX_FAILED, RENTIX_ERROR; its status on stdin)
+    /// Run a command for each job that finished or failed, tried at least once, one at a time (RENTIX_JOB, RENTIX_STATE, RENTIX_FOLDER, RENTIX_FRAMES, RENTIX_FAILED, RENTIX_ERROR; its status on stdin)
     #[arg(long, value_name = "CMD", help_heading = "Watching")]
     pub on_done: Option<String>,
     /// Kill that command, and all that it started, after so many seconds [default: 300]
