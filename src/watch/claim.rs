@@ -48,10 +48,15 @@ impl Claims {
         Ok(claims)
     }
 
-    /// Gives a heartbeat where it is time to.
-    pub(super) fn beat(&mut self, now: Duration) -> Result<(), WatchError> {
+    /// This daemon's name.
+    pub(super) fn me(&self) -> &str {
+        &self.me
+    }
+
+    /// Gives a heartbeat where it is time to; whether it was.
+    pub(super) fn beat(&mut self, now: Duration) -> Result<bool, WatchError> {
         if self.beaten.is_some_and(|at| now.saturating_sub(at) < BEAT_EVERY) {
-            return Ok(());
+            return Ok(false);
         }
         // someone may have removed it
         fs::create_dir_all(&self.folder).map_err(cannot("made", &self.folder))?;
@@ -63,7 +68,7 @@ impl Claims {
             .and_then(|file| file.set_modified(clock::file_time()));
         touched.map_err(cannot("written", &path))?;
         self.beaten = Some(now);
-        Ok(())
+        Ok(true)
     }
 
     fn heart(&self, owner: &str) -> PathBuf {
@@ -151,7 +156,8 @@ impl Claims {
         Ok(found)
     }
 
-    fn lives(&mut self, owner: &str, now: Duration) -> bool {
+    /// Whether a daemon lives, as far as that is known.
+    pub(super) fn lives(&mut self, owner: &str, now: Duration) -> bool {
         if owner == self.me {
             return true;
         }

@@ -1,15 +1,15 @@
 //! The journal: every change of a job's state, appended and never changed.
 //!
-//! One file a daemon, a line a change: a checksum (XXH3, 64 bits, hexadecimal) of the rest, a tab, and the status as
-//! JSON. A line that is torn or damaged counts for nothing. At its start a daemon folds what dead ones left: of each job
-//! the last line stands.
+//! One file a daemon, of the name of its claims, a line a change: a checksum (XXH3, 64 bits, hexadecimal) of the rest, a tab,
+//! and the status as JSON. A line that is torn or damaged counts for nothing. A daemon folds what dead ones left, at its
+//! start and later: of each job the last line stands.
 //!
 //! The line of an end that somebody is to be told of says that this is due, and another one that it was done; what was due
 //! when its daemon died is for the one that folds its journal to tell.
 
 use super::state::{State, Status};
 use super::{WatchError, cannot};
-use crate::output::{self, is_gone, own_name};
+use crate::output::{self, is_gone};
 use serde::{Deserialize, Serialize};
 use std::collections::{HashMap, HashSet};
 use std::fs::{self, File};
@@ -63,28 +63,47 @@ struct Line {
 }
 
 impl Journal {
-    /// Folds what dead daemons left in a folder and begins a journal of its own, in which ends are marked that somebody is to
-    /// be told of, where anybody is.
-    pub(super) fn open(folder: &Path, tells: bool) -> Result<(Self, Known), WatchError> {
+    /// Folds what dead daemons left in a folder and begins the journal of one of that name, in which ends are marked that
+    /// somebody is to be told of, where anybody is.
+    pub(super) fn open(folder: &Path, me: &str, tells: bool) -> Result<(Self, Known), WatchError> {
         fs::create_dir_all(folder).map_err(cannot("made", folder))?;
         let mut gathered = Gathered::default();
         let mut dead = Vec::new();
-        for entry in fs::read_dir(folder).map_err(cannot("read", folder))? {
-            let path = entry.map_err(cannot("read", folder))?.path();
-            let name = path.file_name().and_then(|n| n.to_str()).unwrap_or_default();
-            let Some(owner) = name.strip_suffix(SUFFIX) else { continue };
-            let is_dead = is_gone(owner);
+        for (path, owner) in journals(folder)? {
+            let is_dead = is_gone(&owner);
             gathered.read(&path, is_dead)?;
             if is_dead {
                 dead.push(path);
             }
         }
         let known = gathered.known(tells);
-        let mut journal = Self { path: folder.join(own_name("", SUFFIX)), file: None, tells, bytes: 0 };
+        let mut journal = Self { path: folder.join(format!("{me}{SUFFIX}")), file: None, tells, bytes: 0 };
         if !dead.is_empty() {
             journal.fold(&known, &dead)?;
         }
         Ok((journal, known))
+    }
+
+    /// Folds what daemons left that are dead by now: of another host, or of a container that is gone, that shows in time
+    /// alone. Returns their ends that are due; where nobody is told of ends, they are left to those who tell.
+    pub(super) fn take_over(
+        &mut self,
+        mut lives: impl FnMut(&str) -> bool,
+    ) -> Result<Vec<Status>, WatchError> {
+        let folder = self.path.parent().unwrap_or(Path::new("."));
+        if !self.tells || !folder.exists() {
+            return Ok(Vec::new());
+        }
+        let mut others = journals(folder)?;
+        others.retain(|(path, owner)| *path != self.path && !lives(owner));
+        let dead: Vec<PathBuf> = others.into_iter().map(|(path, _)| path).collect();
+        if dead.is_empty() {
+            return Ok(Vec::new());
+        }
+        let mut theirs = Gathered::default();
+        dead.iter().try_for_each(|path| theirs.read(path, true))?;
+        self.fold_own(&dead)?;
+        Ok(theirs.known(true).due)
     }
 
     /// Begins with what is known, in place of other files.
@@ -125,7 +144,7 @@ impl Journal {
 
     fn append_text(&mut self, mut text: String) -> Result<(), WatchError> {
         if self.bytes > BYTES_MAX {
-            self.fold_own()?;
+            self.fold_own(&[])?;
         }
         let was_torn = self.file.is_none() && self.path.metadata().is_ok_and(|m| m.len() > 0);
         let mut file = match self.file.take().filter(|_| self.path.exists()) {
@@ -141,15 +160,28 @@ impl Journal {
         Ok(())
     }
 
-    /// Goes on in a file that holds what is left of this one.
-    fn fold_own(&mut self) -> Result<(), WatchError> {
+    /// Goes on in a file that holds what is left of this one and of other ones.
+    fn fold_own(&mut self, others: &[PathBuf]) -> Result<(), WatchError> {
         let mut gathered = Gathered::default();
         gathered.read(&self.path, true)?;
-        let new = self.path.with_file_name(own_name("", SUFFIX));
-        let old = std::mem::replace(&mut self.path, new);
+        others.iter().try_for_each(|path| gathered.read(path, true))?;
         (self.file, self.bytes) = (None, 0);
-        self.fold(&gathered.known(self.tells), &[old])
+        self.fold(&gathered.known(self.tells), others)
     }
+}
+
+/// The journals in a folder and the names of their daemons.
+fn journals(folder: &Path) -> Result<Vec<(PathBuf, String)>, WatchError> {
+    let mut found = Vec::new();
+    for entry in fs::read_dir(folder).map_err(cannot("read", folder))? {
+        let path = entry.map_err(cannot("read", folder))?.path();
+        let name = path.file_name().and_then(|n| n.to_str()).unwrap_or_default();
+        if let Some(owner) = name.strip_suffix(SUFFIX) {
+            let owner = owner.to_owned();
+            found.push((path, owner));
+        }
+    }
+    Ok(found)
 }
 
 /// Opens a journal to append to; its folder may have been removed.
@@ -257,11 +289,16 @@ fn from_line(line: &[u8]) -> Option<Line> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::output::own_name;
 
     fn status(job: &str, state: State, at_ms: u64) -> Status {
         let mut status = Status { job: job.into(), state, ..Status::default() };
         status.times.received_ms = at_ms;
         status
+    }
+
+    fn open_new(folder: &Path, tells: bool) -> Result<(Journal, Known), WatchError> {
+        Journal::open(folder, &own_name("", ""), tells)
     }
 
     #[test]
@@ -293,7 +330,7 @@ mod tests {
     #[test]
     fn the_last_state_stands_and_appending_goes_on_after_a_torn_line() {
         let t = tempfile::tempdir().unwrap();
-        let (mut one, none) = Journal::open(t.path(), true).unwrap();
+        let (mut one, none) = open_new(t.path(), true).unwrap();
         assert_eq!(none, Known::default());
         one.append(&[status("a", State::Received, 1)]).unwrap();
         one.append(&[status("b", State::Received, 2)]).unwrap();
@@ -302,7 +339,7 @@ mod tests {
         File::options().append(true).open(&one.path).unwrap().write_all(b"0123\t{torn").unwrap();
         one.file = None;
         one.append(&[status("b", State::Failed, 4)]).unwrap();
-        let (_, mut known) = Journal::open(t.path(), true).unwrap();
+        let (_, mut known) = open_new(t.path(), true).unwrap();
         known.last.sort_by(|a, b| a.job.cmp(&b.job));
         assert_eq!(known.last, [status("a", State::Finished, 3), status("b", State::Failed, 4)]);
         assert_eq!(known.due, [], "the one that lives tells of its ends");
@@ -318,7 +355,7 @@ mod tests {
                 .concat();
         fs::write(t.path().join(dead), lines + "torn").unwrap();
         for _ in 0..2 {
-            let (_, known) = Journal::open(t.path(), true).unwrap();
+            let (_, known) = open_new(t.path(), true).unwrap();
             assert_eq!(known, Known { last: vec![status("a", State::Finished, 2)], due: Vec::new() });
         }
         assert_eq!(fs::read_dir(t.path()).unwrap().count(), 1, "one file, and an empty one is not made");
@@ -327,16 +364,15 @@ mod tests {
     #[test]
     fn a_journal_that_grows_is_folded_and_nothing_that_is_due_is_lost() {
         let t = tempfile::tempdir().unwrap();
-        let (mut journal, _) = Journal::open(t.path(), true).unwrap();
+        let (mut journal, _) = open_new(t.path(), true).unwrap();
         journal.append(&[status("due", State::Failed, 1), status("told", State::Failed, 1)]).unwrap();
         journal.told(&status("told", State::Failed, 1)).unwrap();
-        let first = journal.path.clone();
         for n in 2..100 {
             journal.append(&[status("a", State::Running, n)]).unwrap();
         }
         journal.bytes = BYTES_MAX + 1;
         journal.append(&[status("a", State::Finished, 100)]).unwrap();
-        assert!(!first.exists());
+        assert_eq!(fs::read_dir(t.path()).unwrap().count(), 1);
         let text = fs::read_to_string(&journal.path).unwrap();
         let lines = text.lines().filter(|line| !line.is_empty());
         assert_eq!(lines.count(), 5, "the last of each, what is due, and what was appended: {text}");
@@ -348,6 +384,25 @@ mod tests {
         fs::remove_dir_all(t.path()).unwrap();
         journal.append(&[status("b", State::Running, 101)]).unwrap();
         assert!(journal.path.exists(), "its folder is made anew");
+    }
+
+    #[test]
+    fn what_is_due_in_a_journal_from_elsewhere_is_taken_over_once_its_daemon_is_dead() {
+        let t = tempfile::tempdir().unwrap();
+        let other = || Journal::open(t.path(), "elsewhere.7.0", true).unwrap();
+        let end = status("a", State::Failed, 1);
+        other().0.append(std::slice::from_ref(&end)).unwrap();
+        let (mut journal, known) = open_new(t.path(), true).unwrap();
+        assert_eq!(known.due, [], "it may live");
+        journal.append(&[status("own", State::Finished, 2)]).unwrap();
+        assert_eq!(journal.take_over(|_| true).unwrap(), []);
+        let silent = open_new(t.path(), false).unwrap().0.take_over(|_| false).unwrap();
+        assert_eq!(silent, [], "that one tells nobody");
+        assert_eq!(journal.take_over(|owner| owner != "elsewhere.7.0").unwrap(), [end]);
+        assert_eq!(journal.take_over(|_| false).unwrap(), [], "once");
+        let mut left = Gathered::default();
+        left.read(&journal.path, true).unwrap();
+        assert_eq!(left.known(true).due.len(), 2, "until it was told it is due");
     }
 
     #[test]
@@ -366,7 +421,7 @@ mod tests {
     #[test]
     fn in_one_file_the_later_line_wins() {
         let t = tempfile::tempdir().unwrap();
-        let (mut journal, _) = Journal::open(t.path(), true).unwrap();
+        let (mut journal, _) = open_new(t.path(), true).unwrap();
         let mut end = status("a", State::Finished, 1);
         end.times.ended_ms = Some(9);
         // it changed, and is received again before its end was told of
@@ -375,7 +430,7 @@ mod tests {
             if told {
                 journal.told(&end).unwrap();
             }
-            journal.fold_own().unwrap();
+            journal.fold_own(&[]).unwrap();
             let mut gathered = Gathered::default();
             gathered.read(&journal.path, true).unwrap();
             let known = gathered.known(true);
@@ -403,19 +458,19 @@ mod tests {
             status
         });
         let due_next = |told: &[Status]| {
-            let (mut journal, _) = Journal::open(t.path(), true).unwrap();
+            let (mut journal, _) = open_new(t.path(), true).unwrap();
             journal.append(&ends).unwrap();
             for end in told {
                 journal.told(end).unwrap();
             }
             fs::rename(&journal.path, t.path().join(dead_name())).unwrap();
             // twice: the one that tells of it may be killed, too
-            let once = Journal::open(t.path(), true).unwrap();
+            let once = open_new(t.path(), true).unwrap();
             fs::rename(&once.0.path, t.path().join(dead_name())).unwrap();
-            let again = Journal::open(t.path(), true).unwrap();
+            let again = open_new(t.path(), true).unwrap();
             assert_eq!(once.1.due, again.1.due);
             fs::rename(&again.0.path, t.path().join(dead_name())).unwrap();
-            assert_eq!(Journal::open(t.path(), false).unwrap().1.due, [], "where nobody is to be told");
+            assert_eq!(open_new(t.path(), false).unwrap().1.due, [], "where nobody is to be told");
             for left in fs::read_dir(t.path()).unwrap() {
                 fs::remove_file(left.unwrap().path()).unwrap();
             }

@@ -96,7 +96,7 @@ impl<'a> Daemon<'a> {
         let notifier = Notifier::start(&options.notices, send.clone())?;
         let mut claims = Claims::open(&own.join("claims"), since.elapsed())?;
         clear_unpacked(&own.join("unpacked"), &mut claims, since.elapsed());
-        let (journal, known) = Journal::open(&own.join("journal"), notifier.is_some())?;
+        let (journal, known) = Journal::open(&own.join("journal"), claims.me(), notifier.is_some())?;
         let view = options.listen.map(|_| Shared::default());
         if let Some(view) = &view {
             let mut ended: Vec<_> = known.last.iter().filter(|s| s.state.is_end()).cloned().collect();
@@ -189,8 +189,11 @@ impl<'a> Daemon<'a> {
 
     fn tick(&mut self, stop: &Stop) {
         let now = self.now();
-        if let Err(error) = self.claims.beat(now) {
-            self.in_the_way(&error.to_string());
+        match self.claims.beat(now) {
+            // as often it is looked who has died
+            Ok(true) if !self.stopping => self.take_over_journals(now),
+            Ok(_) => {}
+            Err(error) => self.in_the_way(&error.to_string()),
         }
         if stop.asked() && !self.stopping {
             self.stopping = true;
@@ -204,6 +207,16 @@ impl<'a> Daemon<'a> {
         self.take_turns();
         self.write_all();
         self.renew_view();
+    }
+
+    /// Tells of what daemons that have died told nobody of.
+    fn take_over_journals(&mut self, now: Duration) {
+        let claims = &mut self.claims;
+        match self.journal.take_over(|owner| claims.lives(owner, now)) {
+            Ok(due) => due.iter().for_each(|end| self.notify(end, &self.options.out.join(&end.job))),
+            // they are there still
+            Err(error) => self.in_the_way(&error.to_string()),
+        }
     }
 
     fn take(&mut self, message: Message) {
