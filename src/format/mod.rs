@@ -186,6 +186,13 @@ fn loaded(
     (loaded, parsed)
 }
 
+/// Whether an OBJ can be read to its end; libraries and textures are not looked at.
+pub fn check_obj(path: &Path) -> Result<(), FormatError> {
+    let bytes = text::read(path)?;
+    let text = Text::new(&bytes, path)?;
+    obj::Lines::new(&text, path, false, None, &mut Warnings::default()).map(drop)
+}
+
 /// The box of the positions in an OBJ that are finite, as [`load_obj`] gives them; empty where there is none.
 pub fn scan_bounds(path: &Path) -> Result<Bounds, FormatError> {
     let mut bounds = Bounds::EMPTY;

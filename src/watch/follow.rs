@@ -52,7 +52,7 @@ impl Frames {
 
     /// How a file stands. `next` says whether the frame after it is there already; `ends_whole` looks whether it
     /// ends with a newline and parses to its end, and is asked only when the file has rested long enough for that to
-    /// matter.
+    /// matter, again where it had no time to look.
     pub(super) fn look(
         &mut self,
         name: &OsStr,
@@ -60,7 +60,7 @@ impl Frames {
         done: bool,
         settle: Duration,
         now: Duration,
-        ends_whole: impl FnOnce() -> bool,
+        ends_whole: impl FnOnce() -> Option<bool>,
     ) -> Look {
         let Some(file) = self.files.get_mut(name) else { return Look::Grows };
         if done {
@@ -75,10 +75,11 @@ impl Frames {
         if rested < span {
             return Look::Grows;
         }
-        match *file.ends_whole.get_or_insert_with(ends_whole) {
-            true => Look::Whole,
-            false if rested >= span * LONGER => Look::Rests,
-            false => Look::Grows,
+        file.ends_whole = file.ends_whole.or_else(ends_whole);
+        match file.ends_whole {
+            Some(true) => Look::Whole,
+            Some(false) if rested >= span * LONGER => Look::Rests,
+            _ => Look::Grows,
         }
     }
 
@@ -103,7 +104,7 @@ mod tests {
     }
 
     fn whole(frames: &mut Frames, next: bool, done: bool, now: f64, ends: bool) -> bool {
-        frames.look(OsStr::new("a_1.obj"), next, done, SETTLE, at(now), || ends) != Look::Grows
+        frames.look(OsStr::new("a_1.obj"), next, done, SETTLE, at(now), || Some(ends)) != Look::Grows
     }
 
     #[test]
@@ -113,7 +114,7 @@ mod tests {
         assert!(!whole(&mut f, false, false, 1.9, true) && whole(&mut f, false, false, 2.0, true));
         f.see(&seen(20), at(2.5));
         assert!(!whole(&mut f, false, false, 4.4, true) && whole(&mut f, false, false, 4.5, true));
-        let other = f.look(OsStr::new("a_2.obj"), true, true, SETTLE, at(9e9), || true);
+        let other = f.look(OsStr::new("a_2.obj"), true, true, SETTLE, at(9e9), || Some(true));
         assert_eq!(other, Look::Grows, "not there");
     }
 
@@ -125,8 +126,9 @@ mod tests {
         let mut f = Frames::default();
         f.see(&seen(10), at(0.0));
         assert!(!whole(&mut f, false, false, 9.9, false) && whole(&mut f, false, false, 10.0, false));
-        let rests =
-            |f: &mut Frames, ends| f.look(OsStr::new("a_1.obj"), false, false, SETTLE, at(10.0), || ends);
+        let rests = |f: &mut Frames, ends| {
+            f.look(OsStr::new("a_1.obj"), false, false, SETTLE, at(10.0), || Some(ends))
+        };
         assert_eq!(rests(&mut f, false), Look::Rests);
         let mut f = Frames::default();
         f.see(&seen(10), at(0.0));
@@ -145,13 +147,13 @@ mod tests {
             f.see(&seen(10), at(now));
             f.look(OsStr::new("a_1.obj"), false, false, SETTLE, at(now), || {
                 looks += 1;
-                false
+                Some(false)
             });
         }
         f.see(&seen(11), at(5.0));
         f.look(OsStr::new("a_1.obj"), false, false, SETTLE, at(7.0), || {
             looks += 1;
-            true
+            Some(true)
         });
         assert_eq!(looks, 2);
     }

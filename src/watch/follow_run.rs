@@ -9,6 +9,7 @@ use std::collections::HashSet;
 use std::ffi::OsString;
 use std::fs::File;
 use std::io::{Read, Seek, SeekFrom};
+use std::panic::catch_unwind;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -70,10 +71,9 @@ fn first_bounds(sequence: &Sequence) -> Result<Bounds, FormatError> {
 
 /// Whether a frame's file ends with a newline and parses to its end.
 pub(super) fn ends_whole(path: &Path) -> bool {
-    let within = path.parent().and_then(|folder| folder.canonicalize().ok());
-    let options = format::ReadOptions { within, ..format::ReadOptions::default() };
-    ends_with_newline(path).unwrap_or(false)
-        && format::load_obj(path, &options, &format::TextureCache::new(None, None)).is_ok()
+    // what makes the parser panic is for the run to tell of
+    let parses = || catch_unwind(|| format::check_obj(path)).is_ok_and(|checked| checked.is_ok());
+    ends_with_newline(path).unwrap_or(false) && parses()
 }
 
 fn ends_with_newline(path: &Path) -> std::io::Result<bool> {

@@ -68,12 +68,21 @@ impl Daemon<'_> {
                 self.listed = false;
                 break;
             }
+            // a look may take long
+            self.beat();
             let begun = self.now();
             self.look_at(id);
-            let took = self.now().saturating_sub(begun);
+            let mut took = self.now().saturating_sub(begun);
             if let Some(entry) = self.entries.get_mut(&id) {
                 if entry.phase == Phase::Settling || entry.phase == Phase::Running {
                     entry.due = entry.due.min(begun + self.every);
+                }
+                if let Some(session) = &mut entry.session {
+                    // each file is parsed once, which is no reason to look less often
+                    took = took.saturating_sub(std::mem::take(&mut session.parsed));
+                    if std::mem::take(&mut session.goes_on) {
+                        entry.due = begun;
+                    }
                 }
                 entry.rests = begun + LOOK_SHARE * took;
                 entry.due = entry.due.max(entry.rests);

@@ -188,13 +188,7 @@ impl<'a> Daemon<'a> {
     }
 
     fn tick(&mut self, stop: &Stop) {
-        let now = self.now();
-        match self.claims.beat(now) {
-            // as often it is looked who has died
-            Ok(true) if !self.stopping => self.take_over_journals(now),
-            Ok(_) => {}
-            Err(error) => self.in_the_way(&error.to_string()),
-        }
+        self.beat();
         if stop.asked() && !self.stopping {
             self.stopping = true;
             for stop in self.current.iter().filter_map(|id| self.entries.get(id)?.stop.as_ref()) {
@@ -207,6 +201,16 @@ impl<'a> Daemon<'a> {
         self.take_turns();
         self.write_all();
         self.renew_view();
+    }
+
+    /// Gives a heartbeat where it is time to; as often it is looked who has died.
+    fn beat(&mut self) {
+        let now = self.now();
+        match self.claims.beat(now) {
+            Ok(true) if !self.stopping => self.take_over_journals(now),
+            Ok(_) => {}
+            Err(error) => self.in_the_way(&error.to_string()),
+        }
     }
 
     /// Tells of what daemons that have died told nobody of.

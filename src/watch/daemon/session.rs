@@ -1,5 +1,6 @@
 //! The part of a growing sequence that was seen, and what of it was rendered.
 
+use crate::clock::Stopwatch;
 use crate::watch::follow::{Frames, Look, Stamp};
 use crate::watch::{follow_run, inbox};
 use std::collections::{BTreeMap, HashMap, HashSet};
@@ -7,6 +8,9 @@ use std::ffi::{OsStr, OsString};
 use std::io;
 use std::path::Path;
 use std::time::Duration;
+
+/// A look parses for so long, or one file: meanwhile nothing else is done, and no heartbeat given.
+const PARSES: Duration = Duration::from_millis(100);
 
 /// A followed job.
 #[derive(Debug, Default)]
@@ -22,13 +26,17 @@ pub(super) struct Session {
     pub(super) all: u64,
     /// Files that are taken for whole although they do not end so.
     pub(super) doubtful: HashSet<OsString>,
+    /// How long the last look parsed.
+    pub(super) parsed: Duration,
+    /// Whether it left files for the next one.
+    pub(super) goes_on: bool,
     /// Pictures that were made, and those whose frames failed.
     made: HashSet<String>,
     failed: HashSet<String>,
 }
 
 impl Session {
-    /// Looks at the files of a folder now.
+    /// Looks at the files of a folder now, and parses those that may be whole, for a while.
     pub(super) fn look(
         &mut self,
         folder: &Path,
@@ -36,6 +44,18 @@ impl Session {
         settle: Duration,
         now: Duration,
     ) -> io::Result<()> {
+        self.look_for(PARSES, folder, done, settle, now)
+    }
+
+    fn look_for(
+        &mut self,
+        parses: Duration,
+        folder: &Path,
+        done: bool,
+        settle: Duration,
+        now: Duration,
+    ) -> io::Result<()> {
+        (self.parsed, self.goes_on) = (Duration::ZERO, false);
         let root = inbox::root(folder)?;
         let files = inbox::obj_files(&root)?;
         self.all = files.len() as u64;
@@ -49,7 +69,16 @@ impl Session {
             let stamp = self.frames.stamp(name);
             let was_handed = self.handed.get(*name).copied() == stamp;
             let next = order.get(at + 1).is_some_and(|(after, _)| after.text == of.text);
-            let ends_whole = || follow_run::ends_whole(&root.join(name));
+            let ends_whole = || {
+                if self.parsed > parses {
+                    self.goes_on = true;
+                    return None;
+                }
+                let watch = Stopwatch::start();
+                let ends = follow_run::ends_whole(&root.join(name));
+                self.parsed += watch.elapsed();
+                Some(ends)
+            };
             let is_whole = was_handed
                 || match self.frames.look(name, next, done, settle, now, ends_whole) {
                     Look::Grows => false,
@@ -141,6 +170,23 @@ mod tests {
         assert!(look(&mut s, 100.0).is_empty());
         assert_eq!(look(&mut s, 102.0), ["a_10.obj"], "another content");
         assert_eq!(s.all, 2);
+    }
+
+    #[test]
+    fn a_look_ends_in_time_and_the_next_one_goes_on() {
+        let t = tempfile::tempdir().unwrap();
+        let mut s = Session::default();
+        for n in 1..=3 {
+            fs::write(t.path().join(format!("a_{n}.obj")), "v 0 0 0\n").unwrap();
+        }
+        // each file takes longer than the time that is given
+        let mut ready = Vec::new();
+        for now in [0, 2, 2, 2] {
+            let now = Duration::from_secs(now);
+            s.look_for(Duration::ZERO, t.path(), false, Duration::from_secs(2), now).unwrap();
+            ready.push((s.ready.len(), s.goes_on));
+        }
+        assert_eq!(ready, [(0, false), (1, true), (2, true), (3, false)]);
     }
 
     #[test]
