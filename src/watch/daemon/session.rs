@@ -18,14 +18,12 @@ pub(super) struct Session {
     frames: Frames,
     /// Files that were handed over, as they were then.
     handed: HashMap<OsString, Stamp>,
-    /// Those that are whole and were not.
-    pub(super) ready: HashSet<OsString>,
+    /// Those that are whole and were not, each with how it stands.
+    pub(super) ready: HashMap<OsString, Look>,
     /// Whether it can be followed; None: not looked into yet.
     pub(super) fits: Option<bool>,
     /// Frame files there.
     pub(super) all: u64,
-    /// Files that are taken for whole although they do not end so.
-    pub(super) doubtful: HashSet<OsString>,
     /// How long the last look parsed.
     pub(super) parsed: Duration,
     /// Whether it left files for the next one.
@@ -60,7 +58,7 @@ impl Session {
         let files = inbox::obj_files(&root)?;
         self.all = files.len() as u64;
         self.frames.see(&files, now);
-        self.ready.retain(|name| files.contains_key(name));
+        self.ready.clear();
         let mut order: Vec<(Key, &OsString)> = files.keys().map(|name| (key(name), name)).collect();
         order.sort();
         // where the camera and the light stand follows from the first frame
@@ -79,23 +77,17 @@ impl Session {
                 self.parsed += watch.elapsed();
                 Some(ends)
             };
-            let is_whole = was_handed
-                || match self.frames.look(name, next, done, settle, now, ends_whole) {
-                    Look::Grows => false,
-                    Look::Whole => true,
-                    Look::Rests => {
-                        self.doubtful.insert((*name).clone());
-                        true
-                    }
-                };
-            first_is_whole |= at == 0 && is_whole;
+            let stands = if was_handed {
+                Look::Whole
+            } else {
+                self.frames.look(name, next, done, settle, now, ends_whole)
+            };
+            first_is_whole |= at == 0 && stands != Look::Grows;
             if !first_is_whole {
                 break;
             }
-            if is_whole && !was_handed {
-                self.ready.insert((*name).clone());
-            } else {
-                self.ready.remove(*name);
+            if stands != Look::Grows && !was_handed {
+                self.ready.insert((*name).clone(), stands);
             }
         }
         Ok(())
@@ -110,13 +102,15 @@ impl Session {
         (self.made.len() as u64, self.failed.len() as u64)
     }
 
-    /// Takes the files that are ready.
-    pub(super) fn hand_over(&mut self) -> HashSet<OsString> {
+    /// Takes the files that are ready, and names those of them that are taken for whole although they do not end so.
+    pub(super) fn hand_over(&mut self) -> (HashSet<OsString>, Vec<OsString>) {
         let ready = std::mem::take(&mut self.ready);
         let stamps: BTreeMap<_, _> =
-            ready.iter().filter_map(|n| Some((n.clone(), self.frames.stamp(n)?))).collect();
+            ready.keys().filter_map(|n| Some((n.clone(), self.frames.stamp(n)?))).collect();
         self.handed.extend(stamps);
-        ready
+        let torn = ready.iter().filter(|(_, stands)| **stands == Look::Rests);
+        let torn = torn.map(|(name, _)| name.clone()).collect();
+        (ready.into_keys().collect(), torn)
     }
 }
 
@@ -152,7 +146,7 @@ mod tests {
         let mut s = Session::default();
         let look = |s: &mut Session, now: f64| {
             s.look(t.path(), false, settle, at(now)).unwrap();
-            let mut ready: Vec<_> = s.hand_over().into_iter().map(|n| n.into_string().unwrap()).collect();
+            let mut ready: Vec<_> = s.hand_over().0.into_iter().map(|n| n.into_string().unwrap()).collect();
             ready.sort();
             ready
         };
@@ -187,6 +181,27 @@ mod tests {
             ready.push((s.ready.len(), s.goes_on));
         }
         assert_eq!(ready, [(0, false), (1, true), (2, true), (3, false)]);
+    }
+
+    #[test]
+    fn only_what_is_handed_over_torn_is_said_to_be() {
+        let t = tempfile::tempdir().unwrap();
+        let mut s = Session::default();
+        let put = |text: &str| fs::write(t.path().join("a_1.obj"), text).unwrap();
+        let look = |s: &mut Session, now: u64| {
+            s.look(t.path(), false, Duration::from_secs(2), Duration::from_secs(now)).unwrap();
+            s.ready.len()
+        };
+        put("v 0 0");
+        // it rests so long that it is taken as it stands, but goes on before it is handed over
+        assert_eq!([look(&mut s, 0), look(&mut s, 2), look(&mut s, 10)], [0, 0, 1]);
+        put("v 0 0 0\n");
+        assert_eq!([look(&mut s, 11), look(&mut s, 13)], [0, 1]);
+        assert_eq!(s.hand_over(), (HashSet::from(["a_1.obj".into()]), Vec::new()));
+        let mut s = Session::default();
+        put("v 0 0");
+        assert_eq!([look(&mut s, 0), look(&mut s, 2), look(&mut s, 10)], [0, 0, 1]);
+        assert_eq!(s.hand_over().1, ["a_1.obj"]);
     }
 
     #[test]

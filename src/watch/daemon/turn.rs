@@ -101,8 +101,9 @@ impl Daemon<'_> {
             let session = entry.session.as_mut();
             session.map(|session| {
                 entry.status.frames.all = session.all;
-                doubtful.extend(session.doubtful.drain());
-                session.hand_over()
+                let (ready, torn) = session.hand_over();
+                doubtful = torn;
+                ready
             })
         } else {
             entry.status.frames = FrameCounts::default();
