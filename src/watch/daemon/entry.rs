@@ -4,7 +4,7 @@ use super::session::Session;
 use crate::device::Stop;
 use crate::watch::claim::Claim;
 use crate::watch::inbox::Found;
-use crate::watch::settle::Settling;
+use crate::watch::settle::{Seen, Settling};
 use crate::watch::state::{State, Status};
 use std::sync::Arc;
 use std::time::Duration;
@@ -22,6 +22,11 @@ pub(super) enum Phase {
     Running,
     /// Nothing, until it changes.
     Ended,
+}
+
+/// The word of a settled set in a status.
+pub(super) fn run_word(seen: &Seen) -> String {
+    format!("{:032x}", seen.run)
 }
 
 /// One thing in the inbox.
@@ -103,6 +108,18 @@ impl Entry {
         self.dirty = false;
     }
 
+    /// Whether a status on the disk, another daemon's, is the end of its very run: of the files that are seen, where none was
+    /// accepted yet. Then a cancelled one is wanted again.
+    pub(super) fn is_ended_by(&self, known: &Status) -> bool {
+        let is_run = if self.status.run.is_empty() {
+            let seen = self.settling.is_some_and(|s| known.ended(&run_word(s.seen())));
+            seen && known.state != State::Cancelled
+        } else {
+            known.ended(&self.status.run)
+        };
+        is_run && known.source == self.status.source
+    }
+
     /// Whether nothing more is to be done with it, as far as it is known. An empty folder is not yet a job.
     pub(super) fn is_over(&self) -> bool {
         let is_empty = self.phase == Phase::Settling && self.settling.is_some_and(|s| s.seen().files == 0);
@@ -111,5 +128,35 @@ impl Entry {
 
     pub(super) fn has_failed(&self) -> bool {
         self.phase == Phase::Ended && self.status.state == State::Failed
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::watch::inbox::Kind;
+
+    #[test]
+    fn what_another_daemon_has_ended_is_not_begun_again() {
+        let found = Found { file: "walk".into(), kind: Kind::Folder, name: "walk".into() };
+        let mut entry = Entry::new(found);
+        let seen = Seen { run: 7, ..Seen::default() };
+        entry.settling = Some(Settling::new(seen, Duration::ZERO));
+        let ended = |run: u128, state: State| {
+            let run = run_word(&Seen { run, ..seen });
+            Status { source: "walk".into(), run, state, ..Status::default() }
+        };
+        // it changed here, and is received again
+        entry.enter(State::Received, None);
+        assert!(entry.is_ended_by(&ended(7, State::Finished)) && entry.is_ended_by(&ended(7, State::Failed)));
+        assert!(!entry.is_ended_by(&ended(6, State::Finished)), "that is the run before");
+        assert!(!entry.is_ended_by(&ended(7, State::Running)));
+        assert!(!entry.is_ended_by(&ended(7, State::Cancelled)), "it is wanted again");
+        let other = Status { source: "walk.zip".into(), ..ended(7, State::Finished) };
+        assert!(!entry.is_ended_by(&other));
+        entry.status.run = ended(6, State::Accepted).run;
+        assert!(
+            entry.is_ended_by(&ended(6, State::Cancelled)) && !entry.is_ended_by(&ended(7, State::Finished))
+        );
     }
 }

@@ -1,6 +1,6 @@
 //! Scanning: what is in the inbox, what changed, what is whole.
 
-use super::entry::{Entry, Phase};
+use super::entry::{Entry, Phase, run_word};
 use super::{AGAIN, Daemon, SCAN_EVERY};
 use crate::watch::inbox::{self, Found, Kind};
 use crate::watch::settle::{Seen, Settling};
@@ -313,9 +313,4 @@ impl Daemon<'_> {
         }
         entry.enter(State::Cancelled, Some(why.to_owned()));
     }
-}
-
-/// The word of a settled set in a status.
-fn run_word(seen: &Seen) -> String {
-    format!("{:032x}", seen.run)
 }

@@ -140,10 +140,7 @@ impl Daemon<'_> {
         let Some(entry) = self.entries.get(&id) else { return false };
         let known = Status::read(&self.out(entry));
         let Some(entry) = self.entries.get_mut(&id) else { return false };
-        let ended = known.filter(|k| {
-            !entry.status.run.is_empty() && k.source == entry.status.source && k.ended(&entry.status.run)
-        });
-        let Some(ended) = ended else { return false };
+        let Some(ended) = known.filter(|known| entry.is_ended_by(known)) else { return false };
         entry.status = ended;
         entry.phase = Phase::Ended;
         entry.hush();
