@@ -219,6 +219,25 @@ fn a_followed_sequence_ends_as_the_whole_one_with_its_own_camera() {
 }
 
 #[test]
+fn what_lies_too_deep_fails_and_is_not_waited_for() {
+    let w = Watched::new();
+    fs::create_dir_all(w.job("deep", 1).join(["d"; 40].join("/"))).unwrap();
+    w.job("good", 1);
+    let command = format!("echo $RENTIX_JOB >> {}", w.path("told").display());
+    for _ in 0..2 {
+        w.once(&["--on-done", &command], 1);
+        let status = w.status("deep");
+        assert_eq!([&status["state"], &w.status("good")["state"]], ["failed", "finished"]);
+        let error = status["error"].as_str().unwrap();
+        assert!(error.contains("inbox/deep: folders lie deeper than 32; move them up"), "{error}");
+    }
+    assert_eq!(fs::read_to_string(w.path("told")).unwrap().lines().count(), 2, "each once");
+    fs::remove_dir_all(w.path("inbox/deep/d")).unwrap();
+    w.once(&[], 0);
+    assert_eq!(w.status("deep")["state"], "finished");
+}
+
+#[test]
 fn wrong_use_is_named_and_nothing_is_written() {
     let w = Watched::new();
     for (more, named) in [

@@ -42,7 +42,7 @@ const ENDS: [(&str, Packed); 5] = [
 
 /// So many folders deep a job is looked at.
 const DEPTH_MAX: usize = 32;
-/// A job has no more files; what has is not settled.
+/// A job has no more files.
 const FILES_MAX: u64 = 1_000_000;
 
 /// The archive that a name says and the name without its end.
@@ -108,6 +108,11 @@ fn plain(text: &str) -> String {
         name.pop();
     }
     name
+}
+
+/// Whether a look failed for what the job is: time does not mend that, and the system gave no number for it.
+pub(super) fn is_limit(error: &io::Error) -> bool {
+    error.raw_os_error().is_none()
 }
 
 /// Looks at one job: everything inside it, and what is said beside it.
@@ -316,6 +321,19 @@ mod tests {
         }
         fs::write(job.join("c.obj.part"), "").unwrap();
         assert!(look().unfinished);
+    }
+
+    #[test]
+    fn what_lies_too_deep_is_told_from_what_cannot_be_read() {
+        let t = tempfile::tempdir().unwrap();
+        let found = Found { file: "w".into(), kind: Kind::Folder, name: "w".into() };
+        assert!(!is_limit(&look(t.path(), &found).unwrap_err()), "it is not there");
+        let deep = |depth: usize| fs::create_dir_all(t.path().join("w").join(["d"; 64][..depth].join("/")));
+        deep(DEPTH_MAX).unwrap();
+        look(t.path(), &found).unwrap();
+        deep(DEPTH_MAX + 1).unwrap();
+        let error = look(t.path(), &found).unwrap_err();
+        assert!(is_limit(&error) && error.to_string().contains("move them up"), "{error}");
     }
 
     #[test]

@@ -38,6 +38,8 @@ pub(super) struct Entry {
     pub(super) settling: Option<Settling>,
     /// When it is to be looked at next.
     pub(super) due: Duration,
+    /// Since when it cannot be looked at.
+    pub(super) unseen: Option<Duration>,
     /// It is not looked at before, whatever is told of it.
     pub(super) rests: Duration,
     pub(super) phase: Phase,
@@ -73,6 +75,7 @@ impl Entry {
             named: false,
             settling: None,
             due: Duration::ZERO,
+            unseen: None,
             rests: Duration::ZERO,
             phase: Phase::Settling,
             status: Status { source, ..Status::default() },

@@ -7,12 +7,17 @@ use crate::watch::settle::{Seen, Settling};
 use crate::watch::state::{State, Status, now_ms};
 use std::collections::HashSet;
 use std::ffi::OsString;
+use std::io;
+use std::path::Path;
 use std::time::Duration;
+use xxhash_rust::xxh3::xxh3_128;
 
 /// One job is looked at for this part of the time at most: thousands of frames that are being copied tell of a change without end.
 const LOOK_SHARE: u32 = 10;
 /// What has settled is looked at again after so long, where no event told of a change.
 const REST: Duration = Duration::from_secs(5);
+/// A job that cannot be read for so long fails.
+const UNSEEN_MAX: Duration = Duration::from_secs(30);
 /// A scan looks at jobs for so long, the others' turn comes with the next, at once; what can be begun is begun between the two.
 const LOOKS: Duration = SCAN_EVERY[0];
 /// A followed sequence without `.done` is whole when it has rested so many times longer than other jobs.
@@ -130,13 +135,13 @@ impl Daemon<'_> {
             Ok(seen) => seen,
             Err(error) => {
                 let path = self.options.inbox.join(&entry.found.file);
-                if !path.exists() {
-                    return;
+                if path.exists() {
+                    self.unseen(id, &path, &error);
                 }
-                let text = format!("{}: cannot be read: {error}; it is waited for", path.display());
-                return self.note(&text);
+                return;
             }
         };
+        entry.unseen = None;
         let is_other = if let Some(settling) = &mut entry.settling {
             settling.see(seen, now)
         } else {
@@ -150,6 +155,38 @@ impl Daemon<'_> {
             return;
         }
         self.changed(id, seen, is_other);
+    }
+
+    /// Fails a job that cannot be looked at for what it is, or for long. Once it can be, that is a new run of it.
+    fn unseen(&mut self, id: u64, path: &Path, error: &io::Error) {
+        let now = self.now();
+        let is_rendering = self.current.contains(&id);
+        let Some(entry) = self.entries.get_mut(&id) else { return };
+        let is_limit = inbox::is_limit(error);
+        let lasts = now.saturating_sub(*entry.unseen.get_or_insert(now)) >= UNSEEN_MAX;
+        // what has ended stays so when a share is away for a while
+        let fails = is_limit || lasts && entry.phase != Phase::Ended;
+        let path = path.display();
+        if is_rendering || !fails {
+            return self.note(&format!("{path}: cannot be read: {error}; it is waited for"));
+        }
+        let why = if is_limit {
+            format!("{path}: {error}; it is not rendered")
+        } else {
+            format!("{path}: cannot be read: {error}; it is gone on with once it can be")
+        };
+        let seen = Seen { run: xxh3_128(why.as_bytes()), files: 1, ..Seen::default() };
+        if !entry.named && !self.name(id, &seen) {
+            return;
+        }
+        let Some(entry) = self.entries.get_mut(&id) else { return };
+        let run = run_word(&seen);
+        if entry.status.ended(&run) {
+            return;
+        }
+        (entry.settling, entry.unwanted) = (None, None);
+        entry.status.run = run;
+        entry.enter(State::Failed, Some(why));
     }
 
     /// What a look means for a job that has its name.
