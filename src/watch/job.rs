@@ -2,6 +2,7 @@
 
 use super::archive::{self, ArchiveError};
 use super::inbox::{self, Kind};
+use crate::format::FormatError;
 use crate::job::{self, Job, JobError, Request};
 use std::ffi::OsStr;
 use std::fs;
@@ -23,6 +24,8 @@ pub(super) enum Unfit {
     Archive(#[from] ArchiveError),
     #[error(transparent)]
     Job(#[from] JobError),
+    #[error(transparent)]
+    Frame(#[from] FormatError),
     #[error("{}: is a link; put the job file itself there", .0.display())]
     Link(PathBuf),
     #[error("{}: cannot be used: {source}; look whether it is still there and may be read", path.display())]

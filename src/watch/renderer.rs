@@ -3,7 +3,7 @@
 
 use super::Message;
 use super::follow_run;
-use super::job::{self, Place};
+use super::job::{self, Place, Unfit};
 use crate::device::Stop;
 use crate::job::{Job, Request};
 use crate::run::{self, DeviceReport, Event, Fleet, Outcome, RunOptions};
@@ -39,6 +39,8 @@ pub(super) enum Told {
     Ended(Box<Outcome>),
     /// It cannot be rendered: why.
     Unfit(String),
+    /// It cannot be unpacked for want of space.
+    Full(String),
 }
 
 /// So many jobs share the devices: a small one need not wait for the large ones before it, and each has threads of its own.
@@ -97,26 +99,50 @@ fn one(order: &Order, options: &RunOptions, fleet: &Fleet, messages: &Sender<Mes
         let _ = messages.send(Message::Told(order.id, Told::Event(Box::new(event.clone()))));
     };
     let rendered = catch_unwind(AssertUnwindSafe(|| {
-        let job = prepared(order)?;
+        let job = prepared(order).map_err(|unfit| not_prepared(&unfit))?;
         let priority = order.priority.clamp(i32::MIN.into(), i32::MAX.into()) as i32;
         let options = RunOptions { priority, ..options.clone() };
-        run::render(&job, &options, fleet, &order.stop, &mut tell).map_err(|e| e.to_string())
+        run::render(&job, &options, fleet, &order.stop, &mut tell).map_err(|e| Told::Unfit(e.to_string()))
     }));
     match rendered {
         Ok(Ok(outcome)) => Told::Ended(Box::new(outcome)),
-        Ok(Err(why)) => Told::Unfit(why),
+        Ok(Err(told)) => told,
         Err(_) => Told::Unfit("internal error; the other jobs go on, please report this".to_owned()),
     }
 }
 
-fn prepared(order: &Order) -> Result<Job, String> {
-    let mut job =
-        job::prepare(&order.place, &order.defaults, order.only.is_some()).map_err(|e| e.to_string())?;
+/// What is told where nothing can be rendered.
+fn not_prepared(unfit: &Unfit) -> Told {
+    match unfit {
+        Unfit::Archive(error) if error.is_full_disk() => Told::Full(unfit.to_string()),
+        _ => Told::Unfit(unfit.to_string()),
+    }
+}
+
+fn prepared(order: &Order) -> Result<Job, Unfit> {
+    let mut job = job::prepare(&order.place, &order.defaults, order.only.is_some())?;
     if order.followed && follow_run::can_follow(&job) {
-        follow_run::fix_cameras(&mut job).map_err(|e| e.to_string())?;
+        follow_run::fix_cameras(&mut job)?;
     }
     if let Some(only) = &order.only {
         follow_run::keep(&mut job, only);
     }
     Ok(job)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::archive::ArchiveError;
+    use super::*;
+    use std::io;
+
+    #[test]
+    fn a_full_disk_is_no_fault_of_an_archive() {
+        let write = |kind: io::ErrorKind| {
+            let source = kind.into();
+            not_prepared(&Unfit::Archive(ArchiveError::Write { path: "a_1.obj".into(), source }))
+        };
+        assert!(matches!(write(io::ErrorKind::StorageFull), Told::Full(why) if why.contains("a_1.obj")));
+        assert!(matches!(write(io::ErrorKind::PermissionDenied), Told::Unfit(_)));
+    }
 }

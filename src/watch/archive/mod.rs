@@ -12,7 +12,7 @@ use flate2::read::MultiGzDecoder;
 use names::Names;
 use std::cell::Cell;
 use std::fs::{self, File};
-use std::io::{self, BufReader, Read, Write};
+use std::io::{self, BufReader, ErrorKind, Read, Write};
 use std::path::{Path, PathBuf};
 
 /// What an archive may become.
@@ -54,6 +54,14 @@ pub(super) enum ArchiveError {
     /// What is unpacked cannot be written.
     #[error("{}: cannot be written: {source}; look whether there is space, and whether it may be written", path.display())]
     Write { path: PathBuf, source: io::Error },
+}
+
+impl ArchiveError {
+    /// Whether there was no space, which says nothing of the archive.
+    pub(super) fn is_full_disk(&self) -> bool {
+        let full = [ErrorKind::StorageFull, ErrorKind::QuotaExceeded];
+        matches!(self, Self::Write { source, .. } if full.contains(&source.kind()))
+    }
 }
 
 /// What is done with the entries of an archive.

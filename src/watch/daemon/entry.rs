@@ -54,6 +54,8 @@ pub(super) struct Entry {
     pub(super) wrote: Duration,
     /// Nothing is tried before.
     pub(super) retry: Duration,
+    /// It is not begun before.
+    pub(super) not_before: Duration,
     pub(super) claim: Option<Claim>,
     /// Asks what is being rendered of it to stop.
     pub(super) stop: Option<Arc<Stop>>,
@@ -84,6 +86,7 @@ impl Entry {
             dirty: false,
             wrote: Duration::ZERO,
             retry: Duration::ZERO,
+            not_before: Duration::ZERO,
             claim: None,
             stop: None,
             unwanted: None,

@@ -12,9 +12,13 @@ use std::cmp::Reverse;
 use std::fs;
 use std::io::Write;
 use std::sync::Arc;
+use std::time::Duration;
 
 /// What must fit onto the disk before it is thought to have space again.
 const SPACE_BYTES: usize = 1 << 20;
+
+/// What could not be unpacked for want of space is tried again after so long.
+const FULL_AGAIN: Duration = Duration::from_secs(30);
 
 impl Daemon<'_> {
     /// What the intake found.
@@ -55,7 +59,7 @@ impl Daemon<'_> {
                     && e.session.as_ref().is_some_and(|s| s.fits == Some(true) && !s.ready.is_empty());
                 !self.current.contains(id)
                     && e.named
-                    && e.retry <= now
+                    && e.retry.max(e.not_before) <= now
                     && !e.gone
                     && (e.phase == Phase::Queued || grows)
             };
@@ -156,7 +160,8 @@ impl Daemon<'_> {
         match told {
             Told::Event(event) => self.event(id, &event),
             Told::Ended(outcome) => self.ended(id, &outcome),
-            Told::Unfit(why) => self.stopped(id, Err(why)),
+            Told::Unfit(why) => self.stopped(id, Err((why, false))),
+            Told::Full(why) => self.stopped(id, Err((why, true))),
         }
     }
 
@@ -212,8 +217,10 @@ impl Daemon<'_> {
         self.stopped(id, Ok(outcome));
     }
 
-    /// What is rendered of a job has come to its end, whatever that is.
-    fn stopped(&mut self, id: u64, end: Result<&Outcome, String>) {
+    /// What is rendered of a job has come to its end, whatever that is; where that is for want of space alone, which there may
+    /// be again now that what was unpacked is removed, the job waits.
+    fn stopped(&mut self, id: u64, end: Result<&Outcome, (String, bool)>) {
+        let now = self.now();
         self.current.remove(&id);
         let full = match &end {
             Ok(outcome) if outcome.failed().next().is_none() => None,
@@ -238,12 +245,18 @@ impl Daemon<'_> {
             entry.phase = if grows { Phase::Settling } else { Phase::Queued };
             entry.session = None;
             entry.enter(State::Queued, Some(why.clone()));
-            self.blocked_until = self.now() + AGAIN;
+            self.blocked_until = now + AGAIN;
             self.is_full = true;
+            self.in_the_way(&why);
+        } else if let Err((why, true)) = end {
+            entry.phase = Phase::Queued;
+            entry.enter(State::Queued, Some(why.clone()));
+            // others may need less: they do not wait for it
+            entry.not_before = now + FULL_AGAIN;
             self.in_the_way(&why);
         } else if !grows {
             match end {
-                Err(why) => entry.enter(State::Failed, Some(why)),
+                Err((why, _)) => entry.enter(State::Failed, Some(why)),
                 Ok(outcome) => {
                     let counts = &mut entry.status.frames;
                     (counts.failed, counts.done) = (
@@ -267,7 +280,7 @@ impl Daemon<'_> {
                     }
                 }
             }
-        } else if let Err(why) = end {
+        } else if let Err((why, _)) = end {
             // it may be right once it is whole, which is then tried and told
             self.note(&why);
         }
