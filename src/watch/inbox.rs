@@ -79,7 +79,7 @@ pub(super) fn list(inbox: &Path) -> Result<Inbox, WatchError> {
         let file = entry.file_name();
         let text = file.to_string_lossy().into_owned();
         let says = Path::new(&text).extension().is_some_and(|e| e == "done" || e == "cancel");
-        if text.starts_with('.') || says {
+        if text.starts_with('.') || says || is_unfinished(&text) {
             continue;
         }
         let kind = entry.file_type().map_err(cannot("read", &entry.path()))?;
@@ -89,7 +89,7 @@ pub(super) fn list(inbox: &Path) -> Result<Inbox, WatchError> {
             packed(&text).filter(|(_, stem)| kind.is_file() && !stem.is_empty())
         {
             found.jobs.push(Found { name: plain(stem), kind: Kind::Archive(packed), file });
-        } else if !is_unfinished(&text) {
+        } else {
             found.others.push(file);
         }
     }
@@ -276,10 +276,12 @@ mod tests {
         ] {
             fs::write(t.path().join(name), "").unwrap();
         }
-        fs::create_dir(t.path().join("walk.v2")).unwrap();
+        for name in ["walk.v2", "walk.part", "walk.TMP", "walk~", "part"] {
+            fs::create_dir(t.path().join(name)).unwrap();
+        }
         let inbox = list(t.path()).unwrap();
         let names: Vec<&str> = inbox.jobs.iter().map(|j| j.name.as_str()).collect();
-        assert_eq!(names, ["B", "a", "c", "d", "e", "walk.v2"]);
+        assert_eq!(names, ["B", "a", "c", "d", "e", "part", "walk.v2"]);
         assert_eq!(inbox.jobs[0].kind, Kind::Archive(Packed::TarGz));
         assert_eq!(inbox.others, ["notes.txt"]);
         let error = list(&t.path().join("gone")).unwrap_err().to_string();
