@@ -6,6 +6,8 @@
 //! its page tells of, not with a clock.
 
 mod common;
+#[path = "common/watched.rs"]
+mod watched;
 use common::{assert_same, pictures, render};
 use serde_json::Value;
 use std::collections::BTreeMap;
@@ -16,13 +18,11 @@ use std::net::TcpStream;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Stdio};
 use std::sync::mpsc::{Receiver, channel};
-use std::time::Duration;
+use watched::{PATIENCE, until};
 
 const VIEW: [&str; 6] = ["--size", "64x36", "--eye", "0,0,8", "--look-at", "0,0,0"];
 /// Triangles of a frame.
 const TRIANGLES: usize = 24;
-/// A daemon that says nothing for so long hangs.
-const PATIENCE: Duration = Duration::from_mins(2);
 
 /// A daemon that follows, and what it told.
 struct Daemon {
@@ -104,9 +104,7 @@ impl Daemon {
     /// Waits until it has scanned once more.
     fn scan(&self) {
         let before = self.scanned();
-        while self.scanned() <= before {
-            std::thread::yield_now();
-        }
+        until("a scan", || self.scanned() > before);
     }
 
     fn status(&self) -> Value {

@@ -9,7 +9,7 @@ use serde_json::Value;
 use std::fs;
 use std::io::Write;
 use std::path::Path;
-use watched::Watched;
+use watched::{Watched, until};
 
 fn tar_of(folder: &Path, target: &Path) {
     let mut tar = tar::Builder::new(fs::File::create(target).unwrap());
@@ -277,9 +277,7 @@ fn a_killed_daemon_loses_no_job_and_renders_no_frame_twice() {
         let mut command = common::rentix(w.t.path());
         let mut child =
             command.args(w.args(&["--samples", "4"])).stderr(std::process::Stdio::null()).spawn().unwrap();
-        while ended(&w) <= finished && child.try_wait().unwrap().is_none() {
-            std::thread::yield_now();
-        }
+        until("a frame more", || ended(&w) > finished || child.try_wait().unwrap().is_some());
         child.kill().unwrap();
         child.wait().unwrap();
         finished = ended(&w);
@@ -309,9 +307,7 @@ fn signals_end_the_daemon_and_its_jobs_go_on_later() {
         args.retain(|a| a != "--once");
         let mut child =
             common::rentix(w.t.path()).args(args).stderr(std::process::Stdio::null()).spawn().unwrap();
-        while w.done("walk").is_empty() && child.try_wait().unwrap().is_none() {
-            std::thread::yield_now();
-        }
+        until("a frame", || !w.done("walk").is_empty() || child.try_wait().unwrap().is_some());
         let kill =
             std::process::Command::new("kill").arg(signal).arg(child.id().to_string()).status().unwrap();
         assert!(kill.success());
@@ -335,10 +331,10 @@ fn a_running_daemon_sees_what_changes_and_what_is_cancelled() {
     let mut child =
         common::rentix(w.t.path()).args(args).stderr(std::process::Stdio::null()).spawn().unwrap();
     let mut until = |what: &str, ready: &dyn Fn() -> bool| {
-        while !ready() {
+        until(what, || {
             assert!(child.try_wait().unwrap().is_none(), "{what}: the daemon ended");
-            std::thread::yield_now();
-        }
+            ready()
+        });
     };
     let is = |job: &str, state: &str, done: u64| {
         w.path("done").join(job).join("status.json").exists() && {

@@ -6,7 +6,7 @@ mod watched;
 use common::assert_same;
 use serde_json::Value;
 use std::fs;
-use watched::Watched;
+use watched::{Watched, until};
 
 #[test]
 fn each_of_many_jobs_comes_through_every_state() {
@@ -139,9 +139,8 @@ fn two_daemons_share_an_inbox_and_one_goes_on_when_the_other_is_killed() {
     fs::remove_dir_all(w.path("done")).unwrap();
     let more = ["--samples", "9"];
     let (mut killed, other) = (daemon(&more), daemon(&more));
-    while jobs.iter().all(|job| w.done(job).is_empty()) && killed.try_wait().unwrap().is_none() {
-        std::thread::yield_now();
-    }
+    let is_begun = || jobs.iter().any(|job| !w.done(job).is_empty());
+    until("a frame", || is_begun() || killed.try_wait().unwrap().is_some());
     killed.kill().unwrap();
     killed.wait().unwrap();
     assert!(other.wait_with_output().unwrap().status.success());

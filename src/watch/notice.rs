@@ -223,6 +223,7 @@ impl Mail {
 mod tests {
     use super::super::state::State;
     use super::*;
+    use crate::clock::Stopwatch;
     use std::io::{BufRead, BufReader, Read};
     use std::net::TcpListener;
 
@@ -263,7 +264,9 @@ mod tests {
             let stat = std::fs::read_to_string(format!("/proc/{}/stat", other.trim())).unwrap_or_default();
             !stat.is_empty() && !stat.contains(") Z ")
         };
+        let watch = Stopwatch::start();
         while is_running() {
+            assert!(watch.s() < 120.0, "what it started runs still");
             std::thread::yield_now();
         }
     }

@@ -6,6 +6,19 @@ use serde_json::Value;
 use std::ffi::OsStr;
 use std::fs;
 use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
+
+/// What does not come about for so long hangs.
+pub const PATIENCE: Duration = Duration::from_mins(2);
+
+/// Waits for something, and fails where it does not come about.
+pub fn until(what: &str, mut is_so: impl FnMut() -> bool) {
+    let since = Instant::now();
+    while !is_so() {
+        assert!(since.elapsed() < PATIENCE, "{what}: waited {PATIENCE:?} in vain");
+        std::thread::yield_now();
+    }
+}
 
 /// Size of the pictures.
 pub const SMALL: [&str; 2] = ["--size", "64x36"];
