@@ -1,9 +1,9 @@
 //! The pictures of a job as a film, by ffmpeg.
 
 use crate::job::Job;
+use crate::output::has_mark;
 use std::fmt::Write as _;
-use std::fs::File;
-use std::io::{self, Read, Seek, SeekFrom};
+use std::io;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
@@ -41,8 +41,6 @@ pub enum MovieError {
 
 /// Stands in each film, and tells it from files that others made.
 const MARK: &str = "made by rentix";
-/// So much of a file's beginning and end is looked at for the mark: formats have it with what is said of the whole.
-const LOOK: usize = 1 << 20;
 
 /// Whether ffmpeg can be started, and its film may stand there.
 ///
@@ -57,7 +55,7 @@ pub fn movie_can_be_made(file: &Path, overwrite: bool) -> Result<(), MovieError>
     if file.extension().is_none() {
         return place("its ending tells no format; name it FILE.mp4");
     }
-    if !overwrite && file.symlink_metadata().is_ok() && !is_ours(file) {
+    if !overwrite && file.symlink_metadata().is_ok() && !has_mark(file, MARK) {
         return place("the file there was not made by rentix; --overwrite replaces it");
     }
     let started = Command::new("ffmpeg").arg("-version").stdin(Stdio::null()).output();
@@ -73,22 +71,6 @@ pub fn movie_can_be_made(file: &Path, overwrite: bool) -> Result<(), MovieError>
 
 fn folder_of(file: &Path) -> &Path {
     file.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."))
-}
-
-/// Whether a file has the mark; what cannot be read has none.
-fn is_ours(file: &Path) -> bool {
-    let has_mark = |bytes: &[u8]| bytes.windows(MARK.len()).any(|w| w == MARK.as_bytes());
-    let Ok(mut opened) = File::open(file) else { return false };
-    let mut part = Vec::new();
-    let begins = opened.by_ref().take(LOOK as u64).read_to_end(&mut part).is_ok() && has_mark(&part);
-    part.clear();
-    begins
-        || opened.metadata().is_ok_and(|m| {
-            let from = m.len().saturating_sub(LOOK as u64);
-            opened.seek(SeekFrom::Start(from)).is_ok()
-                && opened.read_to_end(&mut part).is_ok()
-                && has_mark(&part)
-        })
 }
 
 /// Makes a film of a job's pictures by their sequences and numbers, as many a second as the job says. The file is whole or
