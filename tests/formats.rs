@@ -147,7 +147,7 @@ fn jpeg_2000_holds_the_pngs_pixels() {
 
 #[test]
 fn the_smallest_pictures_have_every_format() {
-    let white = Film { rgb: vec![[1.0; 3]], ..Film::new([1, 1], false, AovSet::default()) };
+    let white = Film { rgb: vec![[1.0; 3]].into(), ..Film::new([1, 1], false, AovSet::default()) };
     for word in FORMATS {
         picture_files(Path::new("a"), &white, encoding(word, Bits::Eight)).unwrap();
     }
@@ -158,7 +158,7 @@ fn hdr_is_linear_and_unclamped() {
     let bytes = encode("hdr", Bits::Eight, false);
     assert!(bytes.starts_with(b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 23 +X 37\n"));
     let read = read("hdr", Bits::Eight, false);
-    for (read, wanted) in read.as_rgb32f().unwrap().pixels().zip(&film(false).rgb) {
+    for (read, wanted) in read.as_rgb32f().unwrap().pixels().zip(&*film(false).rgb) {
         let greatest = wanted.iter().copied().fold(0.0, f32::max);
         for (a, b) in read.0.iter().zip(wanted) {
             // mantissas of 8 bits, the greatest from 128, rounded down
@@ -166,7 +166,7 @@ fn hdr_is_linear_and_unclamped() {
         }
     }
     // rows of 3 pixels are not run-length coded
-    let narrow = Film { rgb: vec![[1.0; 3]; 3], ..Film::new([3, 1], false, AovSet::default()) };
+    let narrow = Film { rgb: vec![[1.0; 3]; 3].into(), ..Film::new([3, 1], false, AovSet::default()) };
     let file = picture_files(Path::new("a"), &narrow, encoding("hdr", Bits::Eight)).unwrap().swap_remove(0);
     assert!(file.bytes.ends_with(b"+X 3\n\x80\x80\x80\x81\x80\x80\x80\x81\x80\x80\x80\x81"));
 }

@@ -473,7 +473,7 @@ fn codes_of_gpus_are_those_of_the_linear_film() {
                 let codes =
                     gpu.finish().unwrap().film.into_film().codes.expect("nothing else is wanted of the film");
                 let right = quantize8(&linear.rgb, None, exposure_stops);
-                assert!(codes == right, "{}: {} at {exposure_stops}", adapter.name(), scene.name);
+                assert!(*codes == *right, "{}: {} at {exposure_stops}", adapter.name(), scene.name);
             }
         }
     }

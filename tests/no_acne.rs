@@ -61,7 +61,7 @@ fn dark_pixels(frame: &Frame, eye: DVec3, look_at: DVec3) -> (usize, usize) {
     let film = device.trace(frame, &shot, &Stop::default()).unwrap().film.into_film();
     let depth = film.aovs.depth.unwrap();
     let seen = depth.iter().filter(|d| d.is_finite()).count();
-    let dark = depth.iter().zip(&film.rgb).filter(|(d, rgb)| d.is_finite() && rgb[0] == 0.0).count();
+    let dark = depth.iter().zip(&*film.rgb).filter(|(d, rgb)| d.is_finite() && rgb[0] == 0.0).count();
     (dark, seen)
 }
 

@@ -28,7 +28,7 @@ fn film(alpha: bool, aovs: bool) -> Film {
     };
     Film {
         size: [2, 1],
-        rgb: vec![[0.5, 0.0, 0.25], [2.0, 0.25, 0.125]],
+        rgb: vec![[0.5, 0.0, 0.25], [2.0, 0.25, 0.125]].into(),
         codes: None,
         alpha: alpha.then(|| vec![1.0, 0.5]),
         aovs: if aovs { layers } else { Aovs::default() },

@@ -167,7 +167,7 @@ fn measured(
     let kind = device.info().kind;
     let mut trace = |shot: &Shot| {
         let traced = device.trace(frame, shot, &Stop::default()).map_err(failed)?;
-        Ok::<_, BenchError>((traced.trace_ms, traced.film.into_film().rgb))
+        Ok::<_, BenchError>((traced.trace_ms, traced.film.film().rgb.to_vec()))
     };
     let reference = reference(bench, kind, frame, shot, &mut trace)?;
     let methods = methods(shot, bench.options.quick);

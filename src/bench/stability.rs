@@ -275,7 +275,7 @@ fn dark(bench: &Bench, geometry: Geometry, eye: Vec3, look_at: Vec3) -> Result<(
     let depth = film.aovs.depth.unwrap_or_default();
     let seen = depth.iter().filter(|d| d.is_finite()).count();
     let is_dark = |(d, rgb): &(&f32, &[f32; 3])| d.is_finite() && rgb.iter().all(|x| *x <= 0.0);
-    let dark = depth.iter().zip(&film.rgb).filter(is_dark).count();
+    let dark = depth.iter().zip(&*film.rgb).filter(is_dark).count();
     let pixels = f64::from(LIT[0] * LIT[1]);
     Ok((100.0 * dark as f64 / seen.max(1) as f64, trace_ms * 1e6 / pixels))
 }

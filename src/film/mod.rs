@@ -4,10 +4,12 @@ pub mod color;
 pub mod compare;
 mod flip;
 mod latent;
+mod pixels;
 pub mod quantize;
 
 pub use color::{Srgb8, gain_from_stops};
 pub use latent::LatentFilm;
+pub use pixels::Pixels;
 
 use crate::scene::{Aov, AovSet};
 use std::borrow::Cow;
@@ -18,9 +20,9 @@ pub struct Film {
     /// Width and height in pixels.
     pub size: [u32; 2],
     /// Linear RGB, premultiplied where alpha is there; empty where there are codes.
-    pub rgb: Vec<[f32; 3]>,
+    pub rgb: Pixels<[f32; 3]>,
     /// RGB of 8 bits on the sRGB curve after exposure, three bytes a pixel, where a device made them.
-    pub codes: Option<Vec<u8>>,
+    pub codes: Option<Pixels<u8>>,
     /// Coverage, where it was asked for.
     pub alpha: Option<Vec<f32>>,
     /// Auxiliary pictures.
@@ -65,8 +67,8 @@ impl Aovs {
 
 impl Film {
     /// A film of codes, three bytes a pixel.
-    pub fn of_codes(size: [u32; 2], codes: Vec<u8>) -> Self {
-        Self { size, rgb: Vec::new(), codes: Some(codes), alpha: None, aovs: Aovs::default() }
+    pub fn of_codes(size: [u32; 2], codes: Pixels<u8>) -> Self {
+        Self { size, rgb: Pixels::default(), codes: Some(codes), alpha: None, aovs: Aovs::default() }
     }
 
     /// RGB of 8 bits on the sRGB curve, RGBA with straight colour where there is alpha and it is wanted.
@@ -81,13 +83,13 @@ impl Film {
     /// A black film with room for what is asked.
     pub fn new(size: [u32; 2], alpha: bool, aovs: AovSet) -> Self {
         let n = size[0] as usize * size[1] as usize;
-        Self { rgb: vec![[0.0; 3]; n], ..Self::without_rgb(size, alpha, aovs) }
+        Self { rgb: vec![[0.0; 3]; n].into(), ..Self::without_rgb(size, alpha, aovs) }
     }
 
     /// A black film of codes.
     pub fn new_codes(size: [u32; 2], aovs: AovSet) -> Self {
         let n = size[0] as usize * size[1] as usize;
-        Self { codes: Some(vec![0; 3 * n]), ..Self::without_rgb(size, false, aovs) }
+        Self { codes: Some(vec![0; 3 * n].into()), ..Self::without_rgb(size, false, aovs) }
     }
 
     /// The same before its colour is there.
@@ -95,7 +97,7 @@ impl Film {
         let n = size[0] as usize * size[1] as usize;
         Self {
             size,
-            rgb: Vec::new(),
+            rgb: Pixels::default(),
             codes: None,
             alpha: alpha.then(|| vec![0.0; n]),
             aovs: Aovs {

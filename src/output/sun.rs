@@ -35,7 +35,7 @@ mod tests {
     #[test]
     fn rows_are_blue_first_and_even() {
         let mut film = Film::new([1, 2], false, AovSet::default());
-        film.rgb = vec![[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
+        film.rgb = vec![[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]].into();
         let encoding = Encoding { format: Format::Sun, bits: Bits::Eight, exposure_stops: 0.0, quality: 92 };
         let bytes = encode(&film, encoding).unwrap();
         assert_eq!(bytes[..8], [0x59, 0xa6, 0x6a, 0x95, 0, 0, 0, 1]);

@@ -1,9 +1,10 @@
 //! What a frame's kernels wrote, as a film.
 
+use super::exposed::Exposed;
 use super::records::{CENTER_WORDS, COUNTER_ROWS};
 use super::scene::film_words;
 use crate::device::{Output, RayCounts};
-use crate::film::Film;
+use crate::film::{Film, Pixels};
 use crate::scene::Shot;
 use rayon::ThreadPool;
 use rayon::prelude::*;
@@ -16,8 +17,6 @@ pub(super) const COUNTERS: u64 = COUNTER_ROWS * COUNTER_ROW;
 pub(super) const INSTANTS: u64 = 4;
 /// Storage bindings begin at multiples of this on every adapter.
 const ALIGNMENT: u64 = 256;
-/// Bytes that are copied as one.
-const BLOCK: usize = 64;
 /// Pixels that one thread takes out together.
 const GRAIN: usize = 1 << 15;
 
@@ -91,36 +90,53 @@ pub(super) fn facts(bytes: &[u8], layout: &Layout) -> Facts {
     Facts { rays: ray_counts(bytemuck::cast_slice(part(bytes, &layout.counters))), instants, costs }
 }
 
-/// Takes the film out of a frame's bytes, on the threads of a pool.
+/// Part of a frame's bytes that are as a film has them.
+struct PartOf {
+    exposed: Exposed,
+    range: Range<u64>,
+}
+
+impl AsRef<[u8]> for PartOf {
+    fn as_ref(&self) -> &[u8] {
+        part(self.exposed.as_ref(), &self.range)
+    }
+}
+
+/// The film of a frame's bytes: it keeps them where they are as it has them, and is made of them on the threads of a pool
+/// where they are not.
 pub(super) fn take_out(
-    bytes: &[u8],
+    exposed: Exposed,
     layout: &Layout,
     shot: &Shot,
     output: Output,
     pool: &ThreadPool,
 ) -> Film {
-    let of = |range: &Range<u64>| part(bytes, range);
-    pool.install(|| match output {
-        Output::Codes { .. } => Film::of_codes(shot.size, codes(of(&layout.film), shot.size[0])),
+    let bytes = exposed.as_ref();
+    let size = shot.size;
+    match output {
+        Output::Codes { .. } if 3 * u64::from(size[0]) == code_row_bytes(size[0]) => {
+            Film::of_codes(size, Pixels::lent(PartOf { range: layout.film.clone(), exposed }))
+        }
+        Output::Codes { .. } => Film::of_codes(size, codes(part(bytes, &layout.film), size[0]).into()),
         Output::Linear => {
-            let floats: &[f32] = bytemuck::cast_slice(of(&layout.film));
-            let pixels = shot.size[0] as usize * shot.size[1] as usize;
+            let mut film = Film::without_rgb(size, shot.alpha, shot.aovs);
+            let floats: &[f32] = bytemuck::cast_slice(part(bytes, &layout.film));
             let words_each = film_words(shot, output) as usize;
-            let (pixel_floats, albedo) = floats.split_at(words_each * pixels);
-            let mut film = Film::without_rgb(shot.size, shot.alpha, shot.aovs);
-            if words_each == 3 {
-                let rows = pixel_floats.as_chunks::<3>().0;
-                film.rgb = rows.par_iter().with_min_len(GRAIN).copied().collect();
-            } else {
-                fill_rgb_through(&mut film, pixel_floats);
-            }
+            let rgb_floats = words_each * size[0] as usize * size[1] as usize;
+            let (pixel_floats, albedo) = floats.split_at(rgb_floats);
             if let Some(to) = &mut film.aovs.albedo {
                 to.copy_from_slice(albedo.as_chunks::<3>().0);
             }
-            fill_center(&mut film, bytemuck::cast_slice(of(&layout.center)));
+            fill_center(&mut film, bytemuck::cast_slice(part(bytes, &layout.center)));
+            if words_each == 3 {
+                let start = layout.film.start;
+                film.rgb = Pixels::lent(PartOf { range: start..start + 4 * rgb_floats as u64, exposed });
+            } else {
+                pool.install(|| fill_rgb_through(&mut film, pixel_floats));
+            }
             film
         }
-    })
+    }
 }
 
 /// Bytes of a row of codes: three a pixel, and what fills its last word.
@@ -130,18 +146,9 @@ fn code_row_bytes(width: u32) -> u64 {
 
 /// Codes without what fills words.
 fn codes(bytes: &[u8], width: u32) -> Vec<u8> {
-    let (row, row_bytes) = (3 * width as usize, code_row_bytes(width) as usize);
-    if row == row_bytes {
-        // collected, not filled in: zeros would be written first
-        let (blocks, rest) = bytes.as_chunks::<BLOCK>();
-        let blocks = blocks.par_iter().with_min_len(GRAIN * 3 / BLOCK).copied();
-        let mut codes = blocks.collect::<Vec<[u8; BLOCK]>>().into_flattened();
-        codes.extend_from_slice(rest);
-        return codes;
-    }
     let mut codes = Vec::with_capacity(bytes.len());
-    for bytes in bytes.chunks_exact(row_bytes) {
-        codes.extend_from_slice(&bytes[..row]);
+    for bytes in bytes.chunks_exact(code_row_bytes(width) as usize) {
+        codes.extend_from_slice(&bytes[..3 * width as usize]);
     }
     codes
 }
@@ -149,7 +156,8 @@ fn codes(bytes: &[u8], width: u32) -> Vec<u8> {
 /// Linear RGB and what the background counts for.
 fn fill_rgb_through(film: &mut Film, floats: &[f32]) {
     let rows = floats.as_chunks::<4>().0;
-    film.rgb = rows.par_iter().with_min_len(GRAIN).map(|[r, g, b, _]| [*r, *g, *b]).collect();
+    film.rgb =
+        rows.par_iter().with_min_len(GRAIN).map(|[r, g, b, _]| [*r, *g, *b]).collect::<Vec<_>>().into();
     for share in [&mut film.alpha, &mut film.aovs.coverage].into_iter().flatten() {
         for (to, [.., through]) in share.iter_mut().zip(rows) {
             *to = 1.0 - through;

@@ -5,7 +5,7 @@ use super::adapter::Gpu;
 use super::arena::{Arena, Section};
 use super::cuts::{Cut, GROUP, LANES_MOST, Pace, cuts, tile};
 use super::exposed::{Exposed, FilmBuffers, Free};
-use super::film::{COUNTERS, Facts, INSTANTS, Layout, facts};
+use super::film::{COUNTERS, Facts, INSTANTS, Layout, facts, take_out};
 use super::fits::{Fits, groups, is_top};
 use super::pipelines::{Kernel, Pipelines};
 use super::records::{Slice, WAITING_ROWS};
@@ -172,7 +172,8 @@ impl Ground<'_> {
         Ok(Begun { film: buffers, layout, shot: shot.clone(), output, submission, fits })
     }
 
-    /// Waits for a frame; its film lies in its buffer until it is asked for, and is then copied on the threads of a pool.
+    /// Waits for a frame; its film lies in its buffer until nobody wants it any more. What is not as kernels write it is made
+    /// when it is asked for, on the threads of a pool.
     pub(super) fn finish(
         &mut self,
         begun: Begun,
@@ -183,10 +184,11 @@ impl Ground<'_> {
         let lost =
             |e: wgpu::MapRangeError| DeviceError::Lost { device: self.gpu.name.clone(), why: e.to_string() };
         let view = film.read_by_host().slice(..layout.bytes()).get_mapped_range().map_err(lost)?;
-        let facts = facts(&view, &layout);
+        let exposed = Exposed::new(view, film, &self.buffers.free);
+        let facts = facts(exposed.as_ref(), &layout);
         self.gpu.check()?;
-        let exposed = Exposed { view, film, layout, shot, output, pool: Arc::clone(pool) };
-        Ok((self.buffers.free.latent(exposed), facts))
+        let pool = Arc::clone(pool);
+        Ok((LatentFilm::new(move || take_out(exposed, &layout, &shot, output, &pool)), facts))
     }
 
     #[allow(clippy::too_many_arguments, reason = "what a dispatch is")]
