@@ -78,6 +78,8 @@ pub struct UpdateCost {
     pub update_ms: Option<f64>,
     /// What was built.
     pub built: Work,
+    /// What was made of shapes that a store had.
+    pub restored: Work,
     /// What was refitted and kept.
     pub refitted: Work,
     /// The surface-area cost of the frame's trees over that of their last builds, by triangles; None without trees.

@@ -191,13 +191,14 @@ impl Estimator {
         [update.into_iter().sum(), of(work.trace(), work.traced)]
     }
 
-    /// Tells what reading was expected to take, once the frame's bytes are known, and learns what it took.
-    pub(super) fn read(&self, report: &mut FrameReport, is_posed: bool) {
+    /// Tells what reading was expected to take, once the frame's bytes are known and how they were parsed, and learns what
+    /// it took.
+    pub(super) fn read(&self, report: &mut FrameReport, parsing: Term<'static>) {
         let bytes = report.bytes.read as f64;
+        let is_posed = parsing == Term::Pose;
         report.predicted_ms.read = self.host.then(Term::Read, bytes, report.ms.read.filter(|_| !is_posed));
-        let (term, units) =
-            if is_posed { (Term::Pose, report.triangles as f64) } else { (Term::Parse, bytes) };
-        report.predicted_ms.parse = self.host.then(term, units, report.ms.parse);
+        let units = if is_posed { report.triangles as f64 } else { bytes };
+        report.predicted_ms.parse = self.host.then(parsing, units, report.ms.parse);
     }
 
     /// The same of making a picture file and writing it.
@@ -295,5 +296,40 @@ impl Estimator {
             let bytes = kept.lock().kept(&stored(store, kept.key));
             store.put(KIND, kept.key, &[&bytes]);
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::device::{RayCounts, Spans, Work};
+    use crate::film::{Film, LatentFilm};
+    use crate::scene::AovSet;
+
+    #[test]
+    fn what_the_store_had_says_nothing_of_building() {
+        let info = DeviceInfo {
+            name: "cpu".to_string(),
+            kind: DeviceKind::Cpu,
+            description: String::new(),
+            threads: 1,
+            budget_bytes: 0,
+        };
+        let estimator = Estimator::new(None, std::iter::once(&info));
+        let work = DeviceWork { built: 1_000_000, ..DeviceWork::default() };
+        let traced = Traced {
+            film: LatentFilm::from(Film::new([1, 1], false, AovSet::default())),
+            rays: RayCounts::default(),
+            trace_ms: 1.0,
+            update_ms: None,
+            spans: Spans::default(),
+        };
+        let build_s = || estimator.device_s(0, &work)[0].value;
+        let assumed = build_s();
+        let millisecond = Work { triangles: 1_000_000, ms: 1.0 };
+        estimator.traced(0, &work, &UpdateCost { restored: millisecond, ..UpdateCost::default() }, &traced);
+        assert_eq!(build_s(), assumed);
+        estimator.traced(0, &work, &UpdateCost { built: millisecond, ..UpdateCost::default() }, &traced);
+        assert!((build_s() / 1e-3 - 1.0).abs() < 1e-9, "{}", build_s());
     }
 }

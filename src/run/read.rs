@@ -10,10 +10,11 @@ use super::source::{Place, Sources};
 use super::{Note, RunOptions, panic_text};
 use crate::device::Stop;
 use crate::diff::Change;
-use crate::format::{FormatError, Loaded, ReadOptions};
+use crate::format::{FormatError, Loaded, ReadOptions, Way};
 use crate::job::{Job, Picture, Settings};
 use crate::output::{Bits, Encoding, Format, Records};
 use crate::scene::{Frame, Object, PartHash, PartHasher, Shot};
+use crate::schedule::estimate::Term;
 use crate::warning::Warnings;
 use std::collections::HashMap;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -128,12 +129,13 @@ impl<'a> Reader<'a> {
         let is_first = self.first_of.get(&picture.sequence) == Some(&index);
         let RunOptions { lenient, strict, .. } = *self.options;
         let loaded = load_frame(self.job, picture, is_first, sources, lenient, strict, warnings);
-        let (frame, views, sources, is_posed) = match loaded {
+        let (frame, views, sources, parsing) = match loaded {
             Ok(loaded) => {
                 report.bytes.read = loaded.bytes_read;
                 report.ms.read = Some(loaded.read_ms);
                 report.ms.parse = Some(loaded.parse_ms);
-                (loaded.frame, loaded.views, loaded.sources, loaded.is_posed)
+                let parsing = loaded.parsing();
+                (loaded.frame, loaded.views, loaded.sources, parsing)
             }
             Err(error) => {
                 report.device_failed = matches!(error, LoadError::TooLarge(_));
@@ -142,7 +144,7 @@ impl<'a> Reader<'a> {
             }
         };
         report.triangles = frame.triangles();
-        self.estimator.read(&mut report, is_posed);
+        self.estimator.read(&mut report, parsing);
         let [on_their_way, trees] = self.at_once;
         self.estimator.reckon_host(|| reckoned_bytes(self.job, picture, &frame, on_their_way, trees));
         self.refuse_beyond_memory(&mut report, needed_bytes(&frame))?;
@@ -225,9 +227,23 @@ struct LoadedFrame {
     views: Views,
     /// Whether what stands in it was parsed before and posed now.
     is_posed: bool,
+    /// That of its files that was the most work.
+    way: Way,
     bytes_read: u64,
     read_ms: f64,
     parse_ms: f64,
+}
+
+impl LoadedFrame {
+    /// What kind of work its parsing was.
+    fn parsing(&self) -> Term<'static> {
+        match self.way {
+            _ if self.is_posed => Term::Pose,
+            Way::Afresh => Term::Parse,
+            Way::After => Term::Reparse,
+            Way::Stored => Term::Restore,
+        }
+    }
 }
 
 /// Why a frame cannot be had.
@@ -280,6 +296,7 @@ fn load_frame(
         sources: Vec::new(),
         views: Views::default(),
         is_posed: false,
+        way: Way::default(),
         bytes_read: 0,
         read_ms: 0.0,
         parse_ms: 0.0,
@@ -313,6 +330,7 @@ fn load_frame(
         };
         let (loaded, is_new) = sources.load(path, &options, place)?;
         if is_new {
+            all.way = all.way.max(loaded.way);
             all.bytes_read += loaded.bytes_read;
             all.read_ms += loaded.read_ms;
             all.parse_ms += loaded.parse_ms;

@@ -95,7 +95,7 @@ impl Resident {
             }
         }
         self.residency.end(&plan.again);
-        let update_ms = cost.built.ms + cost.refitted.ms;
+        let update_ms = cost.built.ms + cost.restored.ms + cost.refitted.ms;
         cost.upload_ms = Some(start.ms() - update_ms);
         cost.update_ms = Some(update_ms);
         cost.cost_ratio = self.residency.cost_ratio();
@@ -112,7 +112,7 @@ impl Resident {
         cost: &mut UpdateCost,
     ) -> Result<(), DeviceError> {
         let start = Stopwatch::start();
-        let tree = pool.install(|| stored_or_built(name, geometry, store));
+        let (tree, is_built) = pool.install(|| stored_or_built(name, geometry, store));
         // many small objects may need more than the estimate
         let needed_bytes = |residency: &Residency| residency.bytes() + tree.bytes();
         if needed_bytes(&self.residency) > device.budget_bytes {
@@ -128,7 +128,8 @@ impl Resident {
         let state = TreeState::built(geometry, tree.cost());
         self.residency.hold_tree(name, tree.bytes(), state);
         self.trees.insert(name, Arc::new(tree));
-        cost.built.add(geometry.triangles.0.len() as u64, start.ms());
+        let work = if is_built { &mut cost.built } else { &mut cost.restored };
+        work.add(geometry.triangles.0.len() as u64, start.ms());
         Ok(())
     }
 
@@ -152,17 +153,18 @@ const LEAST_STORED: usize = 2048;
 /// Another name for each way in which trees are built or kept.
 const STORED: &str = "tree-2";
 
-fn stored_or_built(name: PartHash, geometry: &Geometry, store: Option<&Store>) -> Tree {
+/// A tree, and whether it was built.
+fn stored_or_built(name: PartHash, geometry: &Geometry, store: Option<&Store>) -> (Tree, bool) {
     let (positions, triangles) = (&geometry.positions.0, &geometry.triangles.0);
     let build = || Tree::build(positions, triangles, Quality::default());
-    let Some(store) = store.filter(|_| triangles.len() >= LEAST_STORED) else { return build() };
+    let Some(store) = store.filter(|_| triangles.len() >= LEAST_STORED) else { return (build(), true) };
     let stored = store.get(STORED, Key(name.0), Payload::rest);
     if let Some(tree) = stored.and_then(|words| Tree::from_shape(&words, positions, triangles)) {
-        return tree;
+        return (tree, false);
     }
     let tree = build();
     store.put(STORED, Key(name.0), &[bytemuck::cast_slice(&tree.shape())]);
-    tree
+    (tree, true)
 }
 
 fn refuse_beyond(device: &DeviceInfo, needed_bytes: u64) -> Result<(), DeviceError> {

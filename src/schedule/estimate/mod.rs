@@ -31,6 +31,10 @@ pub enum Term<'a> {
     Read,
     /// Parsing them: bytes.
     Parse,
+    /// Parsing them with another frame of the sequence at hand: bytes.
+    Reparse,
+    /// Taking from the store what was parsed of them: bytes.
+    Restore,
     /// Posing what was parsed before: triangles.
     Pose,
     /// Making a picture file of a film, by its format: pixels.
@@ -76,6 +80,8 @@ impl Term<'_> {
         match self {
             Self::Read => (0.5e-9, 65536.0),
             Self::Parse => (2e-9, 65536.0),
+            Self::Reparse => (0.5e-9, 65536.0),
+            Self::Restore => (0.2e-9, 65536.0),
             Self::Pose => (30e-9, 256.0),
             Self::Encode(_) | Self::Write(_) => (8e-9, 4096.0),
             Self::Upload if is_gpu => (0.1e-9, 1e6),
