@@ -55,6 +55,27 @@ fn a_bad_frame_is_named_and_fails_alone() {
 }
 
 #[test]
+fn inspect_goes_on_after_bad_frames_and_tells_costs_by_the_last_good_one() {
+    let t = tempfile::tempdir().unwrap();
+    let t = t.path();
+    let input = wave(&t.join("w"), 5, 4, 6);
+    for bad in [2, 5] {
+        std::fs::write(input.join(format!("wave_000{bad}.obj")), "f 1 2 3\n").unwrap();
+    }
+    let said = run(t, ["inspect", input.to_str().unwrap(), "--device", "cpu"]);
+    assert_eq!(said.status, 1, "{}", said.stderr);
+    for bad in [2, 5] {
+        assert!(said.stderr.contains(&format!("wave_000{bad}.obj:1: ")), "{}", said.stderr);
+    }
+    let lines: Vec<&str> = said.stdout.lines().collect();
+    assert_eq!(lines.iter().filter(|l| l.contains("vertices")).count(), 1, "{}", said.stdout);
+    let changes: Vec<&&str> = lines.iter().filter(|l| l.contains("wave_")).collect();
+    assert!(changes.len() == 3 && changes[0].ends_with("1 added"), "{}", said.stdout);
+    assert!(changes[1..].iter().all(|l| l.ends_with("1 deformed")), "{}", said.stdout);
+    assert_eq!(lines.iter().filter(|l| **l == "expected, ms").count(), 1, "{}", said.stdout);
+}
+
+#[test]
 fn events_are_one_json_object_a_line() {
     let t = tempfile::tempdir().unwrap();
     let t = t.path();

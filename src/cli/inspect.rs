@@ -32,7 +32,8 @@ pub(super) fn inspect(args: &RenderArgs, global: &Global) -> Result<ExitCode> {
         say(global, &format!("warning: {w}"));
     }
     let mut failed = 0;
-    let mut before: Option<(usize, Frame)> = None;
+    // the frame that was read last, and what was seen in it
+    let mut latest: Option<(&Picture, Frame, Seen)> = None;
     let sources = Sources::default();
     let store = store_of(args);
     let devices: Vec<DeviceInfo> = match devices(args, store.clone()) {
@@ -43,30 +44,27 @@ pub(super) fn inspect(args: &RenderArgs, global: &Global) -> Result<ExitCode> {
         }
     };
     for (i, picture) in job.pictures.iter().enumerate() {
-        let is_last = job.pictures.get(i + 1).is_none_or(|next| next.sequence != picture.sequence);
         match read_frame(&job, picture, &sources, args.lenient, &mut warnings) {
             Err(error) => {
                 failed += 1;
                 eprintln!("error: {error}");
-                before = None;
             }
             Ok(frame) => {
-                let same_sequence = before.as_ref().filter(|(s, _)| *s == picture.sequence);
-                let seen = look(same_sequence.map(|(_, f)| f), &frame);
-                tell(
-                    &job,
-                    picture,
-                    &seen,
-                    before.as_ref().is_none_or(|(s, _)| *s != picture.sequence),
-                    global,
-                );
-                if is_last {
-                    let costs = forecast(&job, picture, &frame, &seen.change, store.as_deref(), &devices);
-                    let thesis = Thesis::new(seen.vertices, seen.texture_bytes as f64 / 1e6);
-                    tell_costs(&job.sequences[picture.sequence].name, &thesis, &devices, &costs, global.json);
-                }
-                before = Some((picture.sequence, frame));
+                let before = latest.as_ref().filter(|(p, ..)| p.sequence == picture.sequence);
+                let seen = look(before.map(|(_, frame, _)| frame), &frame);
+                tell(&job, picture, &seen, before.is_none(), global);
+                latest = Some((picture, frame, seen));
             }
+        }
+        if job.pictures.get(i + 1).is_some_and(|next| next.sequence == picture.sequence) {
+            continue;
+        }
+        // by the last frame of the sequence that could be read
+        if let Some((picture, frame, seen)) = latest.as_ref().filter(|(p, ..)| p.sequence == picture.sequence)
+        {
+            let costs = forecast(&job, picture, frame, &seen.change, store.as_deref(), &devices);
+            let thesis = Thesis::new(seen.vertices, seen.texture_bytes as f64 / 1e6);
+            tell_costs(&job.sequences[picture.sequence].name, &thesis, &devices, &costs, global.json);
         }
     }
     for w in warnings.list() {
