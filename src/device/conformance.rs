@@ -2,7 +2,7 @@
 //!
 //! The checks are assertions: they panic, naming what is wrong, where a device does not conform.
 
-use super::{Device, DeviceError, Output, Stop};
+use super::{Device, DeviceError, DeviceKind, Output, Stop};
 use crate::film::Film;
 use crate::math::{DAffine3, DVec3, Vec3};
 use crate::plan::{Action, Residency, Step, Wishes, plan_frame};
@@ -188,20 +188,23 @@ fn a_frame_without_objects_is_background(make: Make) {
     assert!(film.aovs.id.is_none_or(|ids| ids.iter().all(|id| *id == [u32::MAX; 2])));
 }
 
-/// Whether a device makes them or leaves them to the film.
+/// Whether a device makes them or leaves them to the film. One that draws makes them where nothing else is wanted.
 fn codes_are_those_of_the_linear_film(make: Make) {
     let frame = &frames()[1];
     let mut device = make(AMPLE_BYTES);
     picture(&mut *device, frame);
-    for alpha in [false, true] {
-        let shot = Shot { alpha, ..shot() };
+    let plain = Shot { alpha: false, aovs: AovSet::default(), ..shot() };
+    for shot in [plain.clone(), Shot { alpha: false, ..shot() }, Shot { alpha: true, ..shot() }] {
         let linear = device.trace(frame, &shot, &Stop::default()).expect("it is resident").film.into_film();
         for exposure_stops in [0.0, 2.25, -1.5] {
             let output = Output::Codes { exposure_stops };
             device.begin(frame, &shot, output, &Stop::default()).expect("it is resident");
             let film = device.finish().expect("a frame was begun").film.into_film();
             let is_same = film.codes(true, exposure_stops) == linear.codes(true, exposure_stops);
-            assert!(is_same && film.aovs == linear.aovs, "alpha {alpha}, {exposure_stops} stops");
+            let what = format!("alpha {}, {:?}, {exposure_stops} stops", shot.alpha, shot.aovs);
+            assert!(is_same && film.aovs == linear.aovs, "{what}");
+            let draws = device.info().kind != DeviceKind::Fake;
+            assert!(shot != plain || film.codes.is_some() == draws, "{what}");
         }
     }
 }
