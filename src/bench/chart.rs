@@ -1,11 +1,11 @@
-//! Charts as SVG: lines over the frames of a sequence, or over what else is varied, in panels one above the other.
+//! Charts: lines over the frames of a sequence, or over what else is varied, in panels one above the other.
 
-use plotters::coord::Shift;
+use super::drawing::{Area, COLORS, Canvas, Drawing, FONT};
 use plotters::coord::ranged1d::{Ranged, ValueFormatter};
 use plotters::element::PathElement;
 use plotters::prelude::{
-    BLACK, Cartesian2d, ChartBuilder, ChartContext, Circle, Color, DrawingArea, IntoDrawingArea,
-    IntoLogRange, LineSeries, RGBColor, SVGBackend, SeriesLabelPosition, WHITE,
+    BLACK, Cartesian2d, ChartBuilder, ChartContext, Circle, Color, IntoLogRange, LineSeries,
+    SeriesLabelPosition, WHITE,
 };
 use std::error::Error;
 
@@ -45,30 +45,21 @@ pub(super) struct Chart {
 }
 
 const SIZE: (u32, u32) = (900, 620);
-pub(super) const FONT: &str = "sans-serif";
-/// Okabe and Ito's palette, which people with any colour vision can tell apart.
-pub(super) const COLORS: [RGBColor; 8] = [
-    RGBColor(0, 114, 178),
-    RGBColor(230, 159, 0),
-    RGBColor(0, 158, 115),
-    RGBColor(204, 121, 167),
-    RGBColor(86, 180, 233),
-    RGBColor(213, 94, 0),
-    RGBColor(240, 228, 66),
-    RGBColor(0, 0, 0),
-];
 /// Points that are marked each, at most.
 const MARKED: usize = 24;
 /// Widths of lines: where they lie on each other, those below look out.
 const WIDTHS: [u32; 8] = [2, 6, 4, 2, 2, 3, 4, 2];
 
-impl Chart {
-    /// The chart as SVG.
-    pub(super) fn svg(&self) -> Result<String, String> {
-        svg(SIZE, |root| self.draw(root))
+impl Drawing for Chart {
+    fn name(&self) -> &str {
+        &self.name
     }
 
-    fn draw(&self, root: &Area<'_>) -> Result<(), Box<dyn Error>> {
+    fn size(&self) -> (u32, u32) {
+        SIZE
+    }
+
+    fn draw<C: Canvas>(&self, root: &Area<C>) -> Result<(), Box<dyn Error>> {
         let root = root.titled(&self.title, (FONT, 22))?;
         for (area, panel) in root.split_evenly((self.panels.len(), 1)).iter().zip(&self.panels) {
             panel.draw(area)?;
@@ -77,28 +68,8 @@ impl Chart {
     }
 }
 
-/// Where charts are drawn.
-pub(super) type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
-
-/// What is drawn on white, as SVG.
-pub(super) fn svg(
-    size: (u32, u32),
-    draw: impl FnOnce(&Area<'_>) -> Result<(), Box<dyn Error>>,
-) -> Result<String, String> {
-    let drawn = |svg: &mut String| {
-        let root = SVGBackend::with_string(svg, size).into_drawing_area();
-        root.fill(&WHITE)?;
-        draw(&root)?;
-        root.present()?;
-        Ok::<_, Box<dyn Error>>(())
-    };
-    let mut svg = String::new();
-    drawn(&mut svg).map_err(|e| e.to_string())?;
-    Ok(svg)
-}
-
 impl Panel {
-    fn draw(&self, area: &Area<'_>) -> Result<(), Box<dyn Error>> {
+    fn draw<C: Canvas>(&self, area: &Area<C>) -> Result<(), Box<dyn Error>> {
         let points = || self.lines.iter().flat_map(|line| line.points.iter());
         let least = points().map(|p| p.1).fold(f64::INFINITY, f64::min);
         let greatest = points().map(|p| p.1).fold(f64::NEG_INFINITY, f64::max);
@@ -132,11 +103,12 @@ impl Panel {
         }
     }
 
-    fn lines_on<'a, X, Y>(
+    fn lines_on<'a, C, X, Y>(
         &self,
-        mut chart: ChartContext<'a, SVGBackend<'a>, Cartesian2d<X, Y>>,
+        mut chart: ChartContext<'a, C, Cartesian2d<X, Y>>,
     ) -> Result<(), Box<dyn Error>>
     where
+        C: Canvas + 'a,
         X: Ranged<ValueType = f64> + ValueFormatter<f64>,
         Y: Ranged<ValueType = f64> + ValueFormatter<f64>,
     {

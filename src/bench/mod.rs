@@ -6,6 +6,7 @@ mod baseline;
 mod chart;
 mod child;
 mod dots;
+mod drawing;
 mod embree;
 mod estimates;
 mod frames;
@@ -34,7 +35,7 @@ mod warm_cold;
 pub use baseline::Slower;
 
 use baseline::Baseline;
-use chart::Chart;
+use drawing::Drawing;
 pub use mitsuba::Mitsuba;
 pub use table::{Cell, Table};
 pub use times::Spread;
@@ -195,8 +196,16 @@ pub enum BenchError {
 #[derive(Debug, Default)]
 struct Findings {
     tables: Vec<Table>,
-    /// Charts as SVG by their names.
-    charts: Vec<(String, String)>,
+    charts: Vec<Drawn>,
+}
+
+/// A chart.
+#[derive(Debug)]
+struct Drawn {
+    /// Its file name without extension.
+    name: String,
+    svg: String,
+    png: Vec<u8>,
 }
 
 impl Findings {
@@ -205,12 +214,11 @@ impl Findings {
         self.tables.push(table);
     }
 
-    fn draw(&mut self, chart: &Chart) -> Result<(), BenchError> {
-        self.drawn(chart.name.clone(), chart.svg())
-    }
-
-    fn drawn(&mut self, name: String, svg: Result<String, String>) -> Result<(), BenchError> {
-        self.charts.push((name, svg.map_err(BenchError::Chart)?));
+    fn draw(&mut self, drawing: &impl Drawing) -> Result<(), BenchError> {
+        let name = drawing.name().to_string();
+        let svg = drawing.svg().map_err(BenchError::Chart)?;
+        let png = drawing.png().map_err(BenchError::Chart)?;
+        self.charts.push(Drawn { name, svg, png });
         Ok(())
     }
 }
@@ -314,8 +322,9 @@ pub fn bench(
         }
         let json = serde_json::to_vec_pretty(&json).unwrap_or_default();
         write_atomic(&folder.join(format!("{}.json", workload.name)), &json)?;
-        for (name, svg) in &found.charts {
+        for Drawn { name, svg, png } in &found.charts {
             write_atomic(&folder.join(format!("{name}.svg")), svg.as_bytes())?;
+            write_atomic(&folder.join(format!("{name}.png")), png)?;
         }
         page.add(workload, &found);
         // after each: a later one may not come to its end

@@ -1,7 +1,7 @@
 //! The workload `needs`: what each feature costs a scene that has it and does not use it, and one that does. The scene is a sheet
 //! that is twisted; beside it stands the same without.
 
-use super::dots::dots;
+use super::dots::Dots;
 use super::scenes::quoted;
 use super::table::{Cell, Table};
 use super::times::Spread;
@@ -83,7 +83,8 @@ pub(super) fn needs(bench: &Bench, on_event: &mut dyn FnMut(&Event<'_>)) -> Resu
     }
     let mut found = Findings::default();
     let columns = [(0, "without"), (1, "there, not used"), (3, "used")];
-    found.drawn("needs".to_string(), dots(&table, "What features cost", "tracing, ms", &columns))?;
+    let title = "What features cost";
+    found.draw(&Dots { name: "needs", table: &table, title, unit: "tracing, ms", columns: &columns })?;
     found.add(table, on_event);
     Ok(found)
 }

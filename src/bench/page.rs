@@ -2,7 +2,7 @@
 
 use super::peers::Peer;
 use super::table::Table;
-use super::{Bench, Cell, Findings, Slower, Workload};
+use super::{Bench, Cell, Drawn, Findings, Slower, Workload};
 use crate::run::machine;
 use std::fmt::Write as _;
 
@@ -42,7 +42,7 @@ impl Page {
 
     pub(super) fn add(&mut self, workload: &Workload, found: &Findings) {
         let _ = write!(self.body, "<h2>{}</h2><p class=about>{}</p>", workload.name, escaped(workload.about));
-        for (_, svg) in &found.charts {
+        for Drawn { svg, .. } in &found.charts {
             let _ = write!(
                 self.body,
                 "<div class=wide>{}</div>",

@@ -1,7 +1,7 @@
 //! A few warm frames over time: what the host does for them and what the device does, one frame at a time and as many under
 //! way as the device takes.
 
-use super::chart::{Area, FONT, svg};
+use super::drawing::{Area, Canvas, Drawing, FONT};
 use super::frames::{SPHERE, failed, poses, sphere_shot};
 use super::table::{Cell, Table};
 use super::{Bench, BenchError};
@@ -26,19 +26,17 @@ const PICTURE: [u32; 2] = [1920, 1080];
 enum Stage {
     Send,
     HandOver,
-    TakeOut,
     Fit,
     Trace,
 }
 
 impl Stage {
-    const ALL: [Self; 5] = [Self::Send, Self::HandOver, Self::TakeOut, Self::Fit, Self::Trace];
+    const ALL: [Self; 4] = [Self::Send, Self::HandOver, Self::Fit, Self::Trace];
 
     fn word(self) -> &'static str {
         match self {
             Self::Send => "diff, send positions",
             Self::HandOver => "record commands",
-            Self::TakeOut => "take the picture out",
             Self::Fit => "fit the tree",
             Self::Trace => "trace",
         }
@@ -49,7 +47,6 @@ impl Stage {
         match self {
             Self::Send => RGBColor(230, 159, 0),
             Self::HandOver => RGBColor(204, 121, 167),
-            Self::TakeOut => RGBColor(86, 180, 233),
             Self::Fit => RGBColor(0, 158, 115),
             Self::Trace => RGBColor(0, 114, 178),
         }
@@ -79,8 +76,6 @@ struct Lanes {
 /// The chart.
 #[derive(Clone, Debug)]
 pub(super) struct Timeline {
-    /// Its file name without extension.
-    pub(super) name: String,
     lanes: Vec<Lanes>,
 }
 
@@ -117,7 +112,7 @@ pub(super) fn timeline(
         table.row(title.clone(), [Cell::Number(whole / SHOWN as f64), busy(false), busy(true)]);
         lanes.push(Lanes { title, bars });
     }
-    Ok(Some((table, Timeline { name: "timeline".to_string(), lanes })))
+    Ok(Some((table, Timeline { lanes })))
 }
 
 /// The host's times of a frame, ms, and the device's by its own clock.
@@ -125,8 +120,8 @@ struct Frames {
     frame: usize,
     /// When sending began, commands were recorded, all was handed over.
     begun: [f64; 3],
-    /// When the picture began to be taken out, and when that was done.
-    taken: [f64; 2],
+    /// When the picture was there.
+    there: f64,
     spans: Spans,
 }
 
@@ -144,9 +139,7 @@ fn bars(
     let mut finish = |device: &mut dyn Device, begun: &mut VecDeque<(usize, [f64; 3])>| {
         let Some((frame, begun)) = begun.pop_front() else { return Ok(()) };
         let traced = device.finish().map_err(failed)?;
-        let start = clock.ms();
-        std::hint::black_box(traced.film.into_film());
-        done.push(Frames { frame, begun, taken: [start, clock.ms()], spans: traced.spans });
+        done.push(Frames { frame, begun, there: clock.ms(), spans: traced.spans });
         Ok::<_, BenchError>(())
     };
     for i in 0..=before + SHOWN {
@@ -169,7 +162,7 @@ fn bars(
     let Some(first) = done.first().map(|f| f.begun[0]) else { return Ok(None) };
     // the device's clock is ahead of the host's by no more than what the fastest answer shows
     let ahead =
-        done.iter().filter_map(|f| Some(f.spans.trace?[1] - f.taken[0])).fold(f64::NEG_INFINITY, f64::max);
+        done.iter().filter_map(|f| Some(f.spans.trace?[1] - f.there)).fold(f64::NEG_INFINITY, f64::max);
     if !ahead.is_finite() {
         return Ok(None);
     }
@@ -180,7 +173,6 @@ fn bars(
         };
         add(Stage::Send, f.begun[0], f.begun[1]);
         add(Stage::HandOver, f.begun[1], f.begun[2]);
-        add(Stage::TakeOut, f.taken[0], f.taken[1]);
         for (stage, span) in [(Stage::Fit, f.spans.update), (Stage::Trace, f.spans.trace)] {
             if let Some([from, to]) = span {
                 add(stage, from - ahead, to - ahead);
@@ -197,13 +189,16 @@ const RIGHT: i32 = 980;
 /// A lane's height.
 const LANE: i32 = 44;
 
-impl Timeline {
-    /// The chart as SVG.
-    pub(super) fn svg(&self) -> Result<String, String> {
-        svg(SIZE, |root| self.draw(root))
+impl Drawing for Timeline {
+    fn name(&self) -> &'static str {
+        "timeline"
     }
 
-    fn draw(&self, root: &Area<'_>) -> Result<(), Box<dyn Error>> {
+    fn size(&self) -> (u32, u32) {
+        SIZE
+    }
+
+    fn draw<C: Canvas>(&self, root: &Area<C>) -> Result<(), Box<dyn Error>> {
         // both have one scale: that of the frames that are shown of the slowest
         let shown = |b: &&Bar| b.frame < SHOWN;
         let most =
@@ -225,7 +220,7 @@ impl Timeline {
 }
 
 /// A scale below all lanes.
-fn axis(root: &Area<'_>, y: i32, most: f64, x: &impl Fn(f64) -> i32) -> Result<(), Box<dyn Error>> {
+fn axis<C: Canvas>(root: &Area<C>, y: i32, most: f64, x: &impl Fn(f64) -> i32) -> Result<(), Box<dyn Error>> {
     root.draw(&PathElement::new(vec![(LEFT, y), (RIGHT, y)], BLACK))?;
     // five to ten marks, at 1, 2 or 5 of a power of ten
     let power = 10_f64.powf((most / 10.0).log10().ceil());
@@ -240,7 +235,12 @@ fn axis(root: &Area<'_>, y: i32, most: f64, x: &impl Fn(f64) -> i32) -> Result<(
 }
 
 impl Lanes {
-    fn draw(&self, root: &Area<'_>, top: i32, x: &impl Fn(f64) -> i32) -> Result<(), Box<dyn Error>> {
+    fn draw<C: Canvas>(
+        &self,
+        root: &Area<C>,
+        top: i32,
+        x: &impl Fn(f64) -> i32,
+    ) -> Result<(), Box<dyn Error>> {
         root.draw(&Text::new(self.title.clone(), (LEFT, top), text(15, HPos::Left, &BLACK)))?;
         for (on_device, name) in [(false, "host"), (true, "device")] {
             let y = top + 12 + if on_device { LANE } else { 0 };
@@ -272,7 +272,7 @@ mod tests {
     fn a_timeline_names_what_frames_are_at() {
         let bars = Stage::ALL.map(|stage| Bar { frame: 0, stage, from: 0.0, to: 0.7 }).to_vec();
         let lanes = vec![Lanes { title: "one at a time".to_string(), bars }];
-        let svg = Timeline { name: "t".to_string(), lanes }.svg().unwrap();
+        let svg = Timeline { lanes }.svg().unwrap();
         for word in Stage::ALL.map(Stage::word).into_iter().chain(["host", "device", "ms", "one at a time"]) {
             assert!(svg.contains(word), "{word}: {svg}");
         }

@@ -113,7 +113,7 @@ fn devices(
         on_event(&Event::Stage("frames over time"));
         if let Some((table, chart)) = timeline(bench, &mut *device)? {
             findings.add(table, on_event);
-            findings.drawn(chart.name.clone(), chart.svg())?;
+            findings.draw(&chart)?;
         }
     }
     if bench.wants("refit") {

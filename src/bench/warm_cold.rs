@@ -1,7 +1,7 @@
 //! The workload `warm-cold`: what a frame costs when everything is new and when it follows another, beside the thesis's own
 //! figures for its scenes.
 
-use super::dots::dots;
+use super::dots::Dots;
 use super::scenes::quoted;
 use super::sequences::TWIST;
 use super::table::{Cell, Table};
@@ -91,7 +91,8 @@ pub(super) fn warm_cold(bench: &Bench, on_event: &mut dyn FnMut(&Event<'_>)) -> 
         (8, "start, 2012"),
         (10, "a frame after it, 2012"),
     ];
-    found.drawn("warm-cold".to_string(), dots(&table, "Cold and warm", "ms", &columns))?;
+    let title = "Cold and warm";
+    found.draw(&Dots { name: "warm-cold", table: &table, title, unit: "ms", columns: &columns })?;
     found.add(table, on_event);
     Ok(found)
 }
