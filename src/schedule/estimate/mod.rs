@@ -78,9 +78,8 @@ impl Term<'_> {
         };
         let is_gpu = speeds == Speeds::Gpu;
         match self {
-            Self::Read => (0.5e-9, 65536.0),
+            Self::Read | Self::Reparse => (0.5e-9, 65536.0),
             Self::Parse => (2e-9, 65536.0),
-            Self::Reparse => (0.5e-9, 65536.0),
             Self::Restore => (0.2e-9, 65536.0),
             Self::Pose => (30e-9, 256.0),
             Self::Encode(_) | Self::Write(_) => (8e-9, 4096.0),
