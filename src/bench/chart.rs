@@ -180,6 +180,10 @@ mod tests {
         for word in ["Twist", "cost", "frame", "refit", "polyline"] {
             assert!(svg.contains(word), "{word}: {svg}");
         }
+        let png = chart.png().unwrap();
+        assert_eq!(png[..8], *b"\x89PNG\r\n\x1a\n");
+        // the lines' and the letters' pixels, however they are packed
+        assert!(png.len() > 4000, "{}", png.len());
         let empty = Chart { panels: vec![Panel { lines: Vec::new(), ..panel(true) }], ..chart };
         assert!(empty.svg().is_ok());
     }

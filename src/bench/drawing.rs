@@ -1,13 +1,13 @@
 //! What is drawn on white, as SVG and as PNG.
 
-use image::{ImageFormat, RgbImage};
+use crate::film::Film;
+use crate::output::{Bits, Encoding, Format, encode};
 use plotters::coord::Shift;
 use plotters::prelude::{
     BitMapBackend, DrawingArea, DrawingBackend, IntoDrawingArea, RGBColor, SVGBackend, WHITE,
 };
 use plotters::style::{FontStyle, register_font};
 use std::error::Error;
-use std::io::Cursor;
 
 /// An SVG's letters are those of whoever shows it; a PNG's and the room for both are those of a font of our own.
 pub(super) const FONT: &str = "sans-serif";
@@ -52,11 +52,11 @@ pub(super) trait Drawing {
     /// It as PNG.
     fn png(&self) -> Result<Vec<u8>, String> {
         let (width, height) = self.size();
-        let mut image = RgbImage::new(width, height);
-        on_white(self, BitMapBackend::with_buffer(&mut image, self.size()))?;
-        let mut png = Cursor::new(Vec::new());
-        image.write_to(&mut png, ImageFormat::Png).map_err(|e| e.to_string())?;
-        Ok(png.into_inner())
+        let mut codes = vec![0; 3 * width as usize * height as usize];
+        on_white(self, BitMapBackend::with_buffer(&mut codes, self.size()))?;
+        let film = Film::of_codes([width, height], codes.into());
+        let encoding = Encoding { format: Format::Png, bits: Bits::Eight, exposure_stops: 0.0, quality: 92 };
+        encode(&film, encoding).map_err(|e| e.to_string())
     }
 }
 

@@ -168,22 +168,26 @@ fn aov_name(picture: &Path) -> PathBuf {
     picture.with_extension("aov.exr")
 }
 
+/// Encodes a picture; auxiliary ones with it where the format has layers.
+pub fn encode(film: &Film, encoding: Encoding) -> Result<Vec<u8>, OutputError> {
+    let line = encoding.format.line();
+    let refused = |why| OutputError::Encode { format: line.words[0], size: film.size, why };
+    if film.rgb.is_empty() && film.codes.is_none() {
+        return Err(refused("it has no pixels".into()));
+    }
+    (line.encode)(film, encoding).map_err(refused)
+}
+
 /// Encodes the files of a picture, the picture itself first. `picture` is relative to the output folder.
 pub fn picture_files(
     picture: &Path,
     film: &Film,
     encoding: Encoding,
 ) -> Result<Vec<PictureFile>, OutputError> {
-    let line = encoding.format.line();
-    let refused = |format| move |why| OutputError::Encode { format, size: film.size, why };
-    if film.rgb.is_empty() && film.codes.is_none() {
-        return Err(refused(line.words[0])("it has no pixels".into()));
-    }
-    let bytes = (line.encode)(film, encoding).map_err(refused(line.words[0]))?;
-    let mut files = vec![PictureFile { path: picture.to_path_buf(), bytes }];
+    let mut files = vec![PictureFile { path: picture.to_path_buf(), bytes: encode(film, encoding)? }];
     if encoding.format != Format::Exr && film.aovs.any() {
-        let bytes = exr::encode_aovs(film).map_err(refused("exr"))?;
-        files.push(PictureFile { path: aov_name(picture), bytes });
+        let refused = |why| OutputError::Encode { format: "exr", size: film.size, why };
+        files.push(PictureFile { path: aov_name(picture), bytes: exr::encode_aovs(film).map_err(refused)? });
     }
     Ok(files)
 }

@@ -27,7 +27,7 @@ mod tiff;
 pub use atomic::write_atomic;
 pub use compare::{PictureComparison, PictureOutcome, compare_paths};
 pub use difference::first_difference;
-pub use encoding::{Bits, Encoding, Format, PictureFile, file_names, picture_files};
+pub use encoding::{Bits, Encoding, Format, PictureFile, encode, file_names, picture_files};
 pub use error::OutputError;
 pub use finish::{clean_up, finish, foreign};
 pub use mark::has_mark;
