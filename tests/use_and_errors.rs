@@ -58,7 +58,7 @@ fn a_bad_frame_is_named_and_fails_alone() {
 fn inspect_goes_on_after_bad_frames_and_tells_costs_by_the_last_good_one() {
     let t = tempfile::tempdir().unwrap();
     let t = t.path();
-    let input = wave(&t.join("w"), 5, 4, 6);
+    let input = wave(&t.join("w"), 5, 4, 7);
     for bad in [2, 5] {
         std::fs::write(input.join(format!("wave_000{bad}.obj")), "f 1 2 3\n").unwrap();
     }
