@@ -163,7 +163,7 @@ fn jobs_of_higher_priority_come_first_and_then_the_oldest() {
     };
     // as many as are rendered at a time keep the others waiting until all are looked into
     for n in 0..16 {
-        ordered(&format!("a{n:02}"), "samples: 150");
+        ordered(&format!("a{n:02}"), "samples: 1500");
     }
     ordered("b", "priority: -1");
     ordered("c", "priority: 0");

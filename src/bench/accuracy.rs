@@ -173,15 +173,17 @@ fn measured(
     let methods = methods(shot, bench.options.quick);
     let mut times = vec![Vec::new(); methods.len()];
     let mut films = Vec::new();
-    // in turn, so that a machine that slows down slows all of them
+    // in turn, so that a machine that slows down slows all of them; to and fro, for what comes after short ones is faster
     for round in 0..ROUNDS {
-        for (method, times) in methods.iter().zip(&mut times) {
-            if method.shot.samples <= 2 {
+        for turn in 0..methods.len() {
+            let i = if round % 2 == 0 { turn } else { methods.len() - 1 - turn };
+            let shot = &methods[i].shot;
+            if shot.samples <= 2 {
                 // what is over so soon depends on what came before
-                trace(&method.shot)?;
+                trace(shot)?;
             }
-            let (ms, rgb) = trace(&method.shot)?;
-            times.push(ms);
+            let (ms, rgb) = trace(shot)?;
+            times[i].push(ms);
             if round == 0 {
                 films.push(rgb);
             }
