@@ -9,6 +9,7 @@ use super::times::Spread;
 use super::{Bench, BenchError, Event, Findings, child};
 use crate::device::gpu::adapters;
 use crate::job::FrameSet;
+use serde_json::Value;
 use std::ffi::{OsStr, OsString};
 use std::fmt::Write as _;
 use std::fs;
@@ -171,18 +172,18 @@ fn measured(bench: &Bench, input: &Input, device: &str) -> Result<Result<[Cell; 
             (Err(why), _) | (_, Err(why)) => return Ok(Err(why)),
         };
         let (frames, kept) = (child::rendered(&report), child::rendered(&with_store));
-        let (first, kept) = (frames[0], kept[0]);
+        // a file that all frames show is read once, by whichever reader comes first
+        let start_of = |frames: &[&Value]| {
+            let read = frames.iter().map(|f| child::sum_ms(f, "ms", &START));
+            if input.thesis.is_some() { read.fold(0.0, f64::max) } else { read.take(1).sum() }
+        };
         let after = frames.iter().skip(1).map(|f| child::sum_ms(f, "ms", &AFTER)).collect();
         let save = frames.iter().map(|f| child::sum_ms(f, "ms", &SAVE)).collect();
         let medians = [after, save].map(|all| Spread::of(all).map(|s| s.median));
         let [Some(after), Some(save)] = medians else {
             return Ok(Err("no frame follows the first one".to_string()));
         };
-        let of_first = [
-            child::sum_ms(first, "ms", &START),
-            child::sum_ms(kept, "ms", &START),
-            child::sum_ms(first, "ms", &FIRST),
-        ];
+        let of_first = [start_of(&frames), start_of(&kept), child::sum_ms(frames[0], "ms", &FIRST)];
         ms.iter_mut().zip(of_first.into_iter().chain([after, save])).for_each(|(all, x)| all.push(x));
         let held = [&report["totals"]["peak_rss_bytes"], &report["devices"][0]["resident"]["peak"]];
         bytes.iter_mut().zip(held).for_each(|(all, x)| all.extend(x.as_f64().map(|b| b / 1e6)));
