@@ -180,10 +180,14 @@ mod tests {
         for word in ["Twist", "cost", "frame", "refit", "polyline"] {
             assert!(svg.contains(word), "{word}: {svg}");
         }
-        let png = chart.png().unwrap();
-        assert_eq!(png[..8], *b"\x89PNG\r\n\x1a\n");
-        // the lines' and the letters' pixels, however they are packed
-        assert!(png.len() > 4000, "{}", png.len());
+        let pixels = chart.pixels().unwrap();
+        let count = |of: [u8; 3]| pixels.as_chunks::<3>().0.iter().filter(|p| **p == of).count();
+        let (red, green, blue) = COLORS[0].rgb();
+        // the line in both panels, the axes and letters, and white in most of it
+        assert!(count([red, green, blue]) > 500, "{}", count([red, green, blue]));
+        assert!(count([0; 3]) > 1000, "{}", count([0; 3]));
+        assert!(count([255; 3]) > pixels.len() / 3 / 2);
+        assert!(chart.png().unwrap().starts_with(b"\x89PNG\r\n\x1a\n"));
         let empty = Chart { panels: vec![Panel { lines: Vec::new(), ..panel(true) }], ..chart };
         assert!(empty.svg().is_ok());
     }

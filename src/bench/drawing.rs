@@ -24,9 +24,9 @@ pub(super) const COLORS: [RGBColor; 8] = [
 ];
 
 /// What can be drawn on.
-pub(super) trait Canvas: DrawingBackend<ErrorType: Error + Send + Sync + 'static> {}
+pub(super) trait Canvas: DrawingBackend<ErrorType: 'static> {}
 
-impl<B: DrawingBackend<ErrorType: Error + Send + Sync + 'static>> Canvas for B {}
+impl<B: DrawingBackend<ErrorType: 'static>> Canvas for B {}
 
 /// Where something is drawn.
 pub(super) type Area<C> = DrawingArea<C, Shift>;
@@ -49,12 +49,18 @@ pub(super) trait Drawing {
         Ok(svg)
     }
 
-    /// It as PNG.
-    fn png(&self) -> Result<Vec<u8>, String> {
+    /// Its pixels: RGB of 8 bits, rows from the top.
+    fn pixels(&self) -> Result<Vec<u8>, String> {
         let (width, height) = self.size();
         let mut codes = vec![0; 3 * width as usize * height as usize];
         on_white(self, BitMapBackend::with_buffer(&mut codes, self.size()))?;
-        let film = Film::of_codes([width, height], codes.into());
+        Ok(codes)
+    }
+
+    /// It as PNG.
+    fn png(&self) -> Result<Vec<u8>, String> {
+        let (width, height) = self.size();
+        let film = Film::of_codes([width, height], self.pixels()?.into());
         let encoding = Encoding { format: Format::Png, bits: Bits::Eight, exposure_stops: 0.0, quality: 92 };
         encode(&film, encoding).map_err(|e| e.to_string())
     }

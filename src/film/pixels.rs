@@ -10,17 +10,12 @@ pub struct Pixels<T>(Place<T>);
 
 enum Place<T> {
     Own(Vec<T>),
-    Lent(Box<dyn Lent>),
+    Lent(Box<dyn AsRef<[u8]> + Send + Sync>),
 }
 
-/// Bytes that somebody else has use for later.
-pub trait Lent: AsRef<[u8]> + Send + Sync {}
-
-impl<L: AsRef<[u8]> + Send + Sync> Lent for L {}
-
 impl<T: Pod> Pixels<T> {
-    /// Pixels in somebody else's memory: whole ones, aligned.
-    pub fn lent(bytes: impl Lent + 'static) -> Self {
+    /// Pixels in somebody else's memory, whose bytes must be whole pixels and aligned.
+    pub fn lent(bytes: impl AsRef<[u8]> + Send + Sync + 'static) -> Self {
         Self(Place::Lent(Box::new(bytes)))
     }
 }

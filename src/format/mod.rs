@@ -62,23 +62,23 @@ pub struct MaterialOverride {
     pub said_in: PathBuf,
 }
 
-/// How what stands in an OBJ was had; the later, the more work.
+/// How an OBJ was parsed, by rising work.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Way {
-    /// A store had it.
+pub enum ParseKind {
+    /// Not at all: a store had what stands in it.
     #[default]
-    Stored,
-    /// Parsed with another frame of the sequence at hand.
-    After,
-    /// Parsed.
-    Afresh,
+    Restored,
+    /// With another frame of the sequence at hand.
+    Incremental,
+    /// Whole.
+    Full,
 }
 
 /// An OBJ with all that it refers to.
 #[derive(Clone, Debug)]
 pub struct Loaded {
-    /// How it was had.
-    pub way: Way,
+    /// How it was parsed.
+    pub kind: ParseKind,
     /// Shape and materials.
     pub geometry: Arc<Geometry>,
     /// Every file whose content it is made of: OBJ, MTL, textures.
@@ -144,7 +144,7 @@ pub fn load_obj_stored(
     let mut loader = library::Loader::new(path, options);
     let library = loader.library(&stored.libraries(), stored.used_materials(), textures, &mut warnings)?;
     let shape = stored.into_shape(&library, path, &mut warnings);
-    Ok(loaded(Way::Stored, path, digest.1, text, shape, loader, warnings, read_ms, &watch))
+    Ok(loaded(ParseKind::Restored, path, digest.1, text, shape, loader, warnings, read_ms, &watch))
 }
 
 /// Reads an OBJ in memory and all that it refers to; puts it into a store, where one is given, with whether another
@@ -159,7 +159,7 @@ fn load_text(
     textures: &TextureCache,
 ) -> Result<(Loaded, Option<Parsed>), FormatError> {
     let watch = Stopwatch::start();
-    let way = if before.is_some() { Way::After } else { Way::Afresh };
+    let kind = if before.is_some() { ParseKind::Incremental } else { ParseKind::Full };
     let text = Text::new(&bytes, path)?;
     let mut warnings = Warnings::default();
     let lines = obj::Lines::new(&text, path, options.lenient, before, &mut warnings)?;
@@ -172,12 +172,12 @@ fn load_text(
         let key = obj::stored::key(text::digest_of(&bytes), is_followed, options);
         obj::stored::put(store, key, &said, &shape, is_followed);
     }
-    Ok(loaded(way, path, bytes.len() as u64, Some(bytes), shape, loader, warnings, read_ms, &watch))
+    Ok(loaded(kind, path, bytes.len() as u64, Some(bytes), shape, loader, warnings, read_ms, &watch))
 }
 
 #[allow(clippy::too_many_arguments, reason = "the two ways' ends")]
 fn loaded(
-    way: Way,
+    kind: ParseKind,
     path: &Path,
     length: u64,
     text: Option<Vec<u8>>,
@@ -190,7 +190,7 @@ fn loaded(
     let inputs = std::iter::once(path.to_path_buf()).chain(loader.inputs).collect();
     let (geometry, material_names, parsed) = shape.keep(text);
     let loaded = Loaded {
-        way,
+        kind,
         geometry,
         inputs,
         material_names,

@@ -10,7 +10,7 @@ use super::source::{Place, Sources};
 use super::{Note, RunOptions, panic_text};
 use crate::device::Stop;
 use crate::diff::Change;
-use crate::format::{FormatError, Loaded, ReadOptions, Way};
+use crate::format::{FormatError, Loaded, ParseKind, ReadOptions};
 use crate::job::{Job, Picture, Settings};
 use crate::output::{Bits, Encoding, Format, Records};
 use crate::scene::{Frame, Object, PartHash, PartHasher, Shot};
@@ -228,7 +228,7 @@ struct LoadedFrame {
     /// Whether what stands in it was parsed before and posed now.
     is_posed: bool,
     /// That of its files that was the most work.
-    way: Way,
+    kind: ParseKind,
     bytes_read: u64,
     read_ms: f64,
     parse_ms: f64,
@@ -237,11 +237,11 @@ struct LoadedFrame {
 impl LoadedFrame {
     /// What kind of work its parsing was.
     fn parsing(&self) -> Term<'static> {
-        match self.way {
+        match self.kind {
             _ if self.is_posed => Term::Pose,
-            Way::Afresh => Term::Parse,
-            Way::After => Term::Reparse,
-            Way::Stored => Term::Restore,
+            ParseKind::Full => Term::Parse,
+            ParseKind::Incremental => Term::Reparse,
+            ParseKind::Restored => Term::Restore,
         }
     }
 }
@@ -296,7 +296,7 @@ fn load_frame(
         sources: Vec::new(),
         views: Views::default(),
         is_posed: false,
-        way: Way::default(),
+        kind: ParseKind::default(),
         bytes_read: 0,
         read_ms: 0.0,
         parse_ms: 0.0,
@@ -330,7 +330,7 @@ fn load_frame(
         };
         let (loaded, is_new) = sources.load(path, &options, place)?;
         if is_new {
-            all.way = all.way.max(loaded.way);
+            all.kind = all.kind.max(loaded.kind);
             all.bytes_read += loaded.bytes_read;
             all.read_ms += loaded.read_ms;
             all.parse_ms += loaded.parse_ms;

@@ -5,7 +5,7 @@ use super::records::{CENTER_WORDS, COUNTER_ROWS};
 use super::scene::film_words;
 use crate::device::{Output, RayCounts};
 use crate::film::{Film, Pixels};
-use crate::scene::Shot;
+use crate::scene::{AovSet, Shot};
 use rayon::ThreadPool;
 use rayon::prelude::*;
 use std::ops::Range;
@@ -102,8 +102,8 @@ impl AsRef<[u8]> for PartOf {
     }
 }
 
-/// The film of a frame's bytes: it keeps them where they are as it has them, and is made of them on the threads of a pool
-/// where they are not.
+/// The film of a frame's bytes. It keeps them where they are where it is nothing but pixels as it has them; else it is made of
+/// them, on the threads of a pool, and their buffer, which may be much larger, is free again.
 pub(super) fn take_out(
     exposed: Exposed,
     layout: &Layout,
@@ -111,32 +111,42 @@ pub(super) fn take_out(
     output: Output,
     pool: &ThreadPool,
 ) -> Film {
-    let bytes = exposed.as_ref();
     let size = shot.size;
-    match output {
-        Output::Codes { .. } if 3 * u64::from(size[0]) == code_row_bytes(size[0]) => {
-            Film::of_codes(size, Pixels::lent(PartOf { range: layout.film.clone(), exposed }))
-        }
-        Output::Codes { .. } => Film::of_codes(size, codes(part(bytes, &layout.film), size[0]).into()),
+    let is_plain = match output {
+        Output::Codes { .. } => 3 * u64::from(size[0]) == code_row_bytes(size[0]),
+        Output::Linear => !shot.alpha && shot.aovs.is_empty(),
+    };
+    if is_plain {
+        let pixels = PartOf { range: layout.film.clone(), exposed };
+        return match output {
+            Output::Codes { .. } => Film::of_codes(size, Pixels::lent(pixels)),
+            Output::Linear => {
+                Film { rgb: Pixels::lent(pixels), ..Film::without_rgb(size, false, AovSet::default()) }
+            }
+        };
+    }
+    let of = |range: &Range<u64>| part(exposed.as_ref(), range);
+    pool.install(|| match output {
+        Output::Codes { .. } => Film::of_codes(size, codes(of(&layout.film), size[0]).into()),
         Output::Linear => {
-            let mut film = Film::without_rgb(size, shot.alpha, shot.aovs);
-            let floats: &[f32] = bytemuck::cast_slice(part(bytes, &layout.film));
+            let floats: &[f32] = bytemuck::cast_slice(of(&layout.film));
+            let pixels = size[0] as usize * size[1] as usize;
             let words_each = film_words(shot, output) as usize;
-            let rgb_floats = words_each * size[0] as usize * size[1] as usize;
-            let (pixel_floats, albedo) = floats.split_at(rgb_floats);
+            let (pixel_floats, albedo) = floats.split_at(words_each * pixels);
+            let mut film = Film::without_rgb(size, shot.alpha, shot.aovs);
+            if words_each == 3 {
+                let rows = pixel_floats.as_chunks::<3>().0;
+                film.rgb = rows.par_iter().with_min_len(GRAIN).copied().collect::<Vec<_>>().into();
+            } else {
+                fill_rgb_through(&mut film, pixel_floats);
+            }
             if let Some(to) = &mut film.aovs.albedo {
                 to.copy_from_slice(albedo.as_chunks::<3>().0);
             }
-            fill_center(&mut film, bytemuck::cast_slice(part(bytes, &layout.center)));
-            if words_each == 3 {
-                let start = layout.film.start;
-                film.rgb = Pixels::lent(PartOf { range: start..start + 4 * rgb_floats as u64, exposed });
-            } else {
-                pool.install(|| fill_rgb_through(&mut film, pixel_floats));
-            }
+            fill_center(&mut film, bytemuck::cast_slice(of(&layout.center)));
             film
         }
-    }
+    })
 }
 
 /// Bytes of a row of codes: three a pixel, and what fills its last word.

@@ -172,8 +172,7 @@ impl Ground<'_> {
         Ok(Begun { film: buffers, layout, shot: shot.clone(), output, submission, fits })
     }
 
-    /// Waits for a frame; its film lies in its buffer until nobody wants it any more. What is not as kernels write it is made
-    /// when it is asked for, on the threads of a pool.
+    /// Waits for a frame; its film lies in its buffer until it is asked for, and stays there where it is nothing but pixels.
     pub(super) fn finish(
         &mut self,
         begun: Begun,
