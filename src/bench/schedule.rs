@@ -111,7 +111,7 @@ fn families(bench: &Bench, seeds: u64) -> [Table; 4] {
     ];
     let mut affinity = Table::new(
         "affinity",
-        "Affinity: makespan over the bound (mean, worst trace), slowdown and latency (mean, 95th, 99th percentile), cold starts for each job and as a share of busy time, Jain's index of speed beside alone, the longest wait for a first frame, scenes evicted that were needed again, devices over budget, the share of deadlines missed.",
+        "Affinity: makespan over the bound (mean, worst trace), slowdown and latency (mean, 95th, 99th percentile), cold starts for each job and as a share of busy time, Jain's index of speed beside alone, the longest wait for a first frame, scenes made resident again after they were evicted, devices over budget, the share of deadlines missed.",
         &columns,
     );
     let made = |family: Family| (family.name(), (0..seeds).map(|seed| family.trace(seed)).collect());

@@ -97,7 +97,7 @@ impl Device for FakeDevice {
             return Err(self.out_of_memory(needed_bytes));
         }
         let mut uploaded_bytes = 0;
-        self.residency.begin();
+        self.residency.begin(plan.run);
         for step in &plan.steps {
             match *step {
                 Step::Free { name } => self.residency.free(name),

@@ -23,10 +23,14 @@ pub struct Wishes {
     pub update: Update,
     /// What things cost.
     pub costs: Costs,
+    /// The run that the frame is of.
+    pub run: u64,
+    /// Other runs that the device traces frames of in turn with it: what they used last is kept for them.
+    pub others: BTreeSet<u64>,
 }
 
 impl Default for Wishes {
-    /// Without a bound, and nothing comes again.
+    /// Without a bound, nothing comes again and nobody else has the device.
     fn default() -> Self {
         Self {
             cold: false,
@@ -34,6 +38,8 @@ impl Default for Wishes {
             used_again: Vec::new(),
             update: Update::default(),
             costs: Costs::default(),
+            run: 0,
+            others: BTreeSet::new(),
         }
     }
 }
@@ -134,6 +140,8 @@ pub struct UpdatePlan {
     pub predicted_ms: f64,
     /// Whether everything was to be forgotten first.
     pub is_cold: bool,
+    /// The run that the frame is of.
+    pub run: u64,
     /// Parts and trees of the frame that frames to come use again.
     pub again: BTreeSet<PartHash>,
 }
@@ -160,7 +168,7 @@ pub fn tree_name(geometry: &Geometry) -> PartHash {
 
 /// Plans a frame: what is resident is kept, trees over meshes that only moved are refitted where that is expected to take
 /// less time, what is missing is uploaded or built. What the frame does not use is freed, but for what frames to come use
-/// again and nothing overwrites: that is kept while there is space.
+/// again or other runs used last, and nothing overwrites: that is kept while there is space.
 pub fn plan_frame(frame: &Frame, residency: &Residency, wishes: &Wishes) -> UpdatePlan {
     let Wishes { cold, update, costs, .. } = wishes;
     let mut needed: BTreeMap<PartHash, u64> = BTreeMap::new();
@@ -187,7 +195,7 @@ pub fn plan_frame(frame: &Frame, residency: &Residency, wishes: &Wishes) -> Upda
         let is_free = |name: &PartHash| {
             !cold && !used.contains(name) && !taken.contains(name) && !overwritten.contains(name)
         };
-        let step = match candidate(residency, geometry.faces.hash(), triangles, is_free) {
+        let step = match candidate(residency, wishes.run, geometry.faces.hash(), triangles, is_free) {
             None => Step::Build { tree, object, triangles },
             Some(from) => {
                 let state = &residency.trees[&from];
@@ -212,7 +220,8 @@ pub fn plan_frame(frame: &Frame, residency: &Residency, wishes: &Wishes) -> Upda
     }
 
     let unused = |name: &PartHash| *cold || !used.contains(name) && !taken.contains(name);
-    let is_kept = |name: &PartHash, held: &Held| !cold && held.again && !overwritten.contains(name);
+    let is_wanted = |held: &Held| held.again || held.run != wishes.run && wishes.others.contains(&held.run);
+    let is_kept = |name: &PartHash, held: &Held| !cold && is_wanted(held) && !overwritten.contains(name);
     let (kept, freed): (Vec<_>, Vec<_>) =
         residency.held.iter().filter(|(name, _)| unused(name)).partition(|(name, held)| is_kept(name, held));
     let mut steps = Vec::new();
@@ -253,6 +262,7 @@ pub fn plan_frame(frame: &Frame, residency: &Residency, wishes: &Wishes) -> Upda
         part_bytes: needed.values().sum(),
         predicted_ms,
         is_cold: *cold,
+        run: wishes.run,
         again,
     }
 }

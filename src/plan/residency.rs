@@ -59,7 +59,9 @@ pub struct Held {
     pub bytes: u64,
     /// The turn, counted in frames, in which it was used last.
     pub last_used: u64,
-    /// Whether a frame that is known to come will use it.
+    /// The run that used it last.
+    pub run: u64,
+    /// Whether a frame of that run that is known to come will use it.
     pub again: bool,
 }
 
@@ -72,6 +74,8 @@ pub struct Residency {
     pub trees: BTreeMap<PartHash, TreeState>,
     /// Frames that were made resident.
     pub turn: u64,
+    /// The run whose turn it is.
+    run: u64,
     /// Bytes held now.
     bytes: u64,
     /// The most bytes ever held.
@@ -90,23 +94,25 @@ impl Residency {
         self.bytes
     }
 
-    /// A frame's turn begins.
-    pub fn begin(&mut self) {
+    /// The turn of a run's frame begins.
+    pub fn begin(&mut self, run: u64) {
         self.turn += 1;
+        self.run = run;
     }
 
     /// A part or tree was there when a frame needed it.
     pub fn keep(&mut self, name: PartHash) {
         self.hits += 1;
         if let Some(held) = self.held.get_mut(&name) {
-            held.last_used = self.turn;
+            (held.last_used, held.run) = (self.turn, self.run);
         }
     }
 
     /// A part or tree was not there and is now held.
     pub fn hold(&mut self, name: PartHash, bytes: u64) {
         self.misses += 1;
-        let before = self.held.insert(name, Held { bytes, last_used: self.turn, again: false });
+        let held = Held { bytes, last_used: self.turn, run: self.run, again: false };
+        let before = self.held.insert(name, held);
         self.bytes = self.bytes + bytes - before.map_or(0, |held| held.bytes);
         self.peak_bytes = self.peak_bytes.max(self.bytes);
     }
@@ -121,7 +127,7 @@ impl Residency {
     pub fn refit(&mut self, from: PartHash, to: PartHash, geometry: &Geometry, cost: f64) {
         self.hits += 1;
         if let (Some(held), Some(state)) = (self.held.remove(&from), self.trees.remove(&from)) {
-            let before = self.held.insert(to, Held { last_used: self.turn, ..held });
+            let before = self.held.insert(to, Held { last_used: self.turn, run: self.run, ..held });
             self.bytes -= before.map_or(0, |held| held.bytes);
             self.trees.insert(to, state.refitted(geometry, cost));
         }
@@ -148,11 +154,19 @@ impl Residency {
         }
     }
 
-    /// The surface-area cost of the trees over that of their last builds, mean by triangles; None without trees.
+    /// The surface-area cost of the trees that this turn's frame uses over that of their last builds, mean by triangles;
+    /// None without trees.
     pub fn cost_ratio(&self) -> Option<f64> {
-        let triangles: u64 = self.trees.values().map(|s| s.triangles).sum();
-        let sum: f64 = self.trees.values().map(|s| s.triangles as f64 * s.ratio()).sum();
+        let is_used = |name: &PartHash| self.held.get(name).is_some_and(|held| held.last_used == self.turn);
+        let used = || self.trees.iter().filter(|(name, _)| is_used(name)).map(|(_, state)| state);
+        let triangles: u64 = used().map(|s| s.triangles).sum();
+        let sum: f64 = used().map(|s| s.triangles as f64 * s.ratio()).sum();
         (triangles > 0).then(|| sum / triangles as f64)
+    }
+
+    /// Whether a run would find a tree of its own.
+    pub fn holds_trees_of(&self, run: u64) -> bool {
+        self.trees.keys().any(|name| self.held.get(name).is_some_and(|held| held.run == run))
     }
 
     /// What this turn's frame does not use, the least recently used first.

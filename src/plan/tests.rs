@@ -27,7 +27,7 @@ fn strip(triangles: u32, height: f32) -> Object {
 fn apply(residency: &mut Residency, objects: Vec<Object>, wishes: &Wishes) -> Vec<&'static str> {
     let frame = Frame { objects };
     let plan = plan_frame(&frame, residency, wishes);
-    residency.begin();
+    residency.begin(plan.run);
     let mut words = Vec::new();
     for step in &plan.steps {
         words.push(match *step {
@@ -132,4 +132,51 @@ fn of_trees_over_the_same_faces_the_one_used_last_is_refitted() {
     let words = apply(&mut residency, vec![strip(40, 3.0)], &Wishes::default());
     assert!(words.contains(&"refit"), "{words:?}");
     assert!(holds(&residency, &old) && !holds(&residency, &new));
+}
+
+/// A frame of a run; others have the device, too.
+fn of_run(run: u64, others: &[u64], budget_bytes: u64) -> Wishes {
+    let others = others.iter().copied().collect();
+    Wishes { run, others, budget_bytes, update: Update::Refit, ..Wishes::default() }
+}
+
+#[test]
+fn runs_that_take_turns_do_not_free_what_the_other_holds() {
+    for same_faces in [false, true] {
+        let mut residency = Residency::default();
+        let (mut builds, mut held) = ([0; 2], Vec::new());
+        for frame in 0..10 {
+            for run in [1, 2] {
+                let triangles = if same_faces { 40 } else { 40 + run as u32 };
+                let object = strip(triangles, frame as f32 + 0.5 * run as f32);
+                let words = apply(&mut residency, vec![object], &of_run(run, &[3 - run], u64::MAX));
+                builds[run as usize - 1] += words.iter().filter(|&&word| word == "build").count();
+            }
+            held.push(residency.bytes());
+        }
+        // a tree over the same faces serves both
+        assert_eq!(builds, if same_faces { [1, 0] } else { [1, 1] });
+        assert!(held.iter().all(|bytes| *bytes == held[0]), "{held:?}");
+        assert_eq!(residency.evictions, 0);
+    }
+}
+
+#[test]
+fn what_a_run_used_goes_when_it_has_ended_or_there_is_no_space() {
+    let (a, b) = (strip(40, 0.0), strip(50, 0.0));
+    let both = |others: &[u64], budget_bytes| {
+        let mut residency = Residency::default();
+        apply(&mut residency, vec![a.clone()], &of_run(1, &[2], budget_bytes));
+        let of_first = residency.bytes();
+        apply(&mut residency, vec![b.clone()], &of_run(2, others, budget_bytes));
+        assert!(holds(&residency, &b));
+        (of_first, residency)
+    };
+    let (of_first, kept) = both(&[1], u64::MAX);
+    assert!(holds(&kept, &a) && kept.holds_trees_of(1) && kept.holds_trees_of(2));
+    let (_, ended) = both(&[], u64::MAX);
+    assert!(ended.held.values().all(|held| held.run == 2) && ended.evictions == 0);
+    assert_eq!(ended.bytes(), kept.bytes() - of_first);
+    let (_, tight) = both(&[1], kept.bytes() - 1);
+    assert!(tight.evictions > 0 && tight.bytes() < kept.bytes());
 }

@@ -4,7 +4,7 @@
 use crate::clock::Stopwatch;
 use crate::device::Stop;
 use crate::schedule::{Costs, DeviceFacts, JobId, Lease, NewJob, Policy, ScheduleError, Scheduler};
-use std::collections::{BTreeMap, HashMap};
+use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 
 /// Frames that are read ahead of a device keep it so long from other runs, s; two of them always, so that one is read while the
@@ -196,10 +196,28 @@ impl<'a> Share<'a> {
     /// A device made the scene resident, in so many seconds.
     pub(super) fn started(&self, device: usize, seconds: f64) {
         let now_s = self.hub.clock.s();
-        self.change(|s, _| {
-            s.scheduler.learn(now_s, device, self.job, None, Some(seconds));
-            s.scheduler.holds(device, self.job, true);
-        });
+        self.hub.lock().scheduler.learn(now_s, device, self.job, None, Some(seconds));
+    }
+
+    /// Its name among the runs that share the devices.
+    pub(super) fn run(&self) -> u64 {
+        self.job.0 as u64
+    }
+
+    /// The names of the others.
+    pub(super) fn others(&self) -> BTreeSet<u64> {
+        let runs = self.hub.lock().runs.keys().map(|job| job.0 as u64).collect::<BTreeSet<_>>();
+        runs.into_iter().filter(|&run| run != self.run()).collect()
+    }
+
+    /// A device holds these bytes of the run, and the scenes of those runs that are told.
+    pub(super) fn holds(&self, device: usize, bytes: u64, is_resident: impl Fn(u64) -> bool) {
+        let mut state = self.hub.lock();
+        let State { scheduler, runs, .. } = &mut *state;
+        for &job in runs.keys() {
+            scheduler.holds(device, job, is_resident(job.0 as u64));
+        }
+        scheduler.takes(device, self.job, bytes);
     }
 
     /// A frame failed on a device: whether another one tries it.

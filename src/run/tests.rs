@@ -12,8 +12,12 @@ const FRAMES: usize = 6;
 
 /// Frames of one triangle that grows.
 fn sequence(folder: &Path) -> Request {
-    for frame in 1..=FRAMES {
-        let obj = format!("v 0 0 0\nv {frame} 0 0\nv 0 1 0\nf 1 2 3\n");
+    sequence_of(folder, FRAMES, "f 1 2 3")
+}
+
+fn sequence_of(folder: &Path, frames: usize, faces: &str) -> Request {
+    for frame in 1..=frames {
+        let obj = format!("v 0 0 0\nv {frame} 0 0\nv 0 1 0\n{faces}\n");
         std::fs::write(folder.join(format!("t_{frame}.obj")), obj).unwrap();
     }
     Request {
@@ -238,4 +242,32 @@ fn a_device_that_stays_lost_gives_its_frames_to_another() {
     let outcome = run_on(&sequence(t.path()), &[&lost, &[]], Policy::default(), &two_threads());
     assert_eq!(outcome.report.totals.rendered, FRAMES as u64, "{:?}", statuses(&outcome));
     assert!(outcome.report.frames.iter().all(|f| f.device.as_deref() == Some("fake:1")));
+}
+
+/// A long run, and one that begins once the first frame of that was made: neither makes its scene resident twice.
+#[test]
+fn runs_that_take_turns_on_a_device_keep_their_scenes_there() {
+    let t = tempfile::tempdir().unwrap();
+    let job = |name: &str, frames: usize, faces: &str| {
+        let folder = t.path().join(name);
+        std::fs::create_dir(&folder).unwrap();
+        resolve(&sequence_of(&folder, frames, faces)).unwrap()
+    };
+    let (long, short) = (job("long", 200, "f 1 2 3"), job("short", 20, "f 1 2 3\nf 1 3 2"));
+    let device = Box::new(FakeDevice::new("fake", 1 << 20));
+    let (fleet, stop) = (Fleet::new(vec![device], Policy::default()), Stop::default());
+    let options = RunOptions { update: crate::plan::Update::Refit, ..two_threads() };
+    let mut outcomes = Vec::new();
+    let mut on_event = |event: &Event| {
+        if matches!(event, Event::Frame(_)) && outcomes.is_empty() {
+            outcomes.push(render(&short, &options, &fleet, &stop, &mut |_| {}).unwrap());
+        }
+    };
+    let outcome = render(&long, &options, &fleet, &stop, &mut on_event).unwrap();
+    outcomes.push(outcome);
+    for outcome in &outcomes {
+        let actions = outcome.report.frames.iter().map(|f| f.update.action.unwrap());
+        let made = actions.filter(|&action| action != "refit").count();
+        assert_eq!(made, 1, "of {} frames", outcome.report.frames.len());
+    }
 }

@@ -129,10 +129,18 @@ struct UnderWay {
     read: ReadFrame,
     /// Bytes of the host's memory, until it has left this stage.
     bytes: u64,
+    begun: Begun,
+    /// When that was, s.
+    begun_s: f64,
+}
+
+/// What the device did for a frame before it could be traced.
+#[derive(Clone, Debug, Default)]
+struct Begun {
     work: DeviceWork,
     cost: UpdateCost,
-    /// When it was begun, s.
-    begun_s: f64,
+    /// Whether the device held no tree of the run.
+    is_start: bool,
 }
 
 /// A frame, and what came of it: None while it is under way.
@@ -194,20 +202,14 @@ impl DeviceStage<'_> {
         self.told.busy_s += busy.s();
         self.tell_holds();
         match begun {
-            Ok((work, cost)) => {
+            Ok(begun) => {
                 let (frame, fingerprint) = (Arc::clone(&read.frame), read.fingerprint);
                 self.before = Some(Before { frame, fingerprint, film: None });
                 self.forget(false);
-                self.under_way.push_back(UnderWay { read, bytes, work, cost, begun_s });
+                self.under_way.push_back(UnderWay { read, bytes, begun, begun_s });
             }
             Err(failure) => {
-                let frame = UnderWay {
-                    read,
-                    bytes,
-                    work: DeviceWork::default(),
-                    cost: UpdateCost::default(),
-                    begun_s,
-                };
+                let frame = UnderWay { read, bytes, begun: Begun::default(), begun_s };
                 if may_retry && failure.is_lost() {
                     let mut lost = std::mem::take(&mut self.under_way);
                     lost.push_back(frame);
@@ -344,9 +346,10 @@ impl DeviceStage<'_> {
         let _ = self.ends.note.send(Note::Device(self.ends.device, self.told.clone()));
     }
 
-    fn update_and_begin(&mut self, read: &mut ReadFrame) -> Result<(DeviceWork, UpdateCost), DeviceError> {
+    fn update_and_begin(&mut self, read: &mut ReadFrame) -> Result<Begun, DeviceError> {
         let Some(held) = &mut self.held else { return Err(DeviceError::Stopped) };
         let Held { device, forget } = &mut **held;
+        let Ends { estimator, share, device: place, .. } = self.ends;
         let report = &mut read.report;
         let clock = Stopwatch::start();
         let cold = self.cold || *forget;
@@ -358,22 +361,28 @@ impl DeviceStage<'_> {
             budget_bytes: device.info().budget_bytes,
             used_again: if self.cold { Vec::new() } else { std::mem::take(&mut read.used_again) },
             update: self.update,
-            costs: self.learned.costs(self.ends.share.left()),
+            costs: self.learned.costs(share.left()),
+            run: share.run(),
+            others: share.others(),
         };
-        let plan = plan_frame(&read.frame, device.residency(), &wishes);
+        let residency = device.residency();
+        let plan = plan_frame(&read.frame, residency, &wishes);
         let work = DeviceWork::new(&plan, &read.frame, Rays::of_shot(&read.shot));
-        let Ends { estimator, device: place, .. } = self.ends;
+        let is_start = plan.is_cold || !residency.holds_trees_of(plan.run);
+        let needed_bytes = plan.needed_bytes(residency);
         estimator.begins(place, &work, report);
-        report.bytes.predicted = Some(estimator.resident_bytes(place, &plan, device.residency()));
+        report.bytes.predicted = Some(estimator.resident_bytes(place, &plan, residency));
         let cost = device.apply(&plan, &read.frame)?;
-        estimator.built(place, &plan, device.residency());
-        report.bytes.resident = Some(device.residency().bytes());
+        let residency = device.residency();
+        share.holds(place, needed_bytes, |run| residency.holds_trees_of(run));
+        estimator.built(place, &plan, residency);
+        report.bytes.resident = Some(residency.bytes());
         report.updated(&plan, &cost);
         let exposure_stops = read.encoding.exposure_stops;
         let output =
             if read.encoding.takes_codes() { Output::Codes { exposure_stops } } else { Output::Linear };
         device.begin(&read.frame, &read.shot, output, self.ends.stop)?;
-        Ok((work, cost))
+        Ok(Begun { work, cost, is_start })
     }
 
     /// Tells what a frame took: from its begin, or from the end of the one before, to its own.
@@ -383,17 +392,17 @@ impl DeviceStage<'_> {
         self.ended_s = ended_s;
         let Ends { device, share, .. } = self.ends;
         let index = frame.read.report.index;
-        if frame.read.report.warm {
-            share.done(device, index, seconds);
-        } else {
+        if frame.begun.is_start {
             share.started(device, seconds);
             share.done(device, index, 0.0);
+        } else {
+            share.done(device, index, seconds);
         }
     }
 
     /// Learns from a frame that was traced, and reports it.
     fn learn(&mut self, frame: &mut UnderWay, traced: &Traced) {
-        let UnderWay { read, work, cost, .. } = frame;
+        let UnderWay { read, begun: Begun { work, cost, .. }, .. } = frame;
         let report = &mut read.report;
         if let Some(ms) = traced.update_ms {
             report.ms.update = Some(cost.update_ms.unwrap_or(0.0) + ms);

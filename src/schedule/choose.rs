@@ -115,7 +115,8 @@ impl Scheduler {
             return false;
         };
         let (warm_s, cold_s) = self.costs(device, id);
-        let price_s = if is_priced { self.price_s(one, warm_s, cold_s) } else { 0.0 };
+        let price_s =
+            if is_priced { self.price_s(one, warm_s, cold_s + self.evicted_s(device, one)) } else { 0.0 };
         self.helps(now_s, device, id, one, cold_s, price_s)
     }
 
@@ -143,9 +144,9 @@ impl Scheduler {
         first_s > self.work_s + soonest
     }
 
-    /// Seconds that a job must gain for another copy to be worth what all lose by it: a cold start takes the devices
-    /// `cold_s`, at this one's share of their speed, from all that is to be done, so that every job ends so much later; as a
-    /// share of what each takes alone, summed up, that is `pressure` times as much.
+    /// Seconds that a job must gain for another copy to be worth what all lose by it: cold starts, its own and those of
+    /// what it pushes out, take the devices `cold_s`, at this one's share of their speed, from all that is to be done, so
+    /// that every job ends so much later; as a share of what each takes alone, summed up, that is `pressure` times as much.
     fn price_s(&self, one: &Job, warm_s: f64, cold_s: f64) -> f64 {
         let share = one.least_warm_s() / warm_s / self.parallel(one);
         self.weights.price * one.alone_s * self.pressure * cold_s * share
@@ -156,6 +157,28 @@ impl Scheduler {
         let least_s = one.least_warm_s();
         let fitting = one.estimates.iter().zip(&self.kinds).filter(|(e, _)| e.costs.fits);
         fitting.map(|(e, kind)| kind.present as f64 * least_s / e.costs.warm_s).sum::<f64>().max(1.0)
+    }
+
+    /// Seconds of the cold starts that others would take again on a device: of those that have frames left and must go for
+    /// a job's scene, the least recently served first.
+    fn evicted_s(&self, device: usize, one: &Job) -> f64 {
+        let facing = &self.devices[device];
+        let kind = facing.facts.kind;
+        let held = || facing.resident.iter().filter_map(|&JobId(id)| Some((id, self.jobs[id].as_ref()?)));
+        let held_bytes = held().map(|(_, other)| other.estimates[kind].bytes).fold(0, u64::saturating_add);
+        let needed_bytes = held_bytes.saturating_add(one.estimates[kind].bytes);
+        let mut over_bytes = needed_bytes.saturating_sub(facing.facts.budget_bytes);
+        let mut seconds = 0.0;
+        for (id, other) in held() {
+            if over_bytes == 0 {
+                break;
+            }
+            over_bytes = over_bytes.saturating_sub(other.estimates[kind].bytes);
+            if other.open.len() > 0 {
+                seconds += self.costs(device, id).1;
+            }
+        }
+        seconds
     }
 
     fn key(&self, one: &Job, cold_s: f64) -> Key {

@@ -14,7 +14,7 @@ pub(super) struct Device {
     pub(super) start_slowness: f64,
     /// The job that it takes its runs from.
     pub(super) serving: Option<Serving>,
-    /// Jobs whose scenes it holds; those that have ended are dropped in passing.
+    /// Jobs whose scenes it holds, the one served last at the end; those that have ended are dropped in passing.
     pub(super) resident: Vec<JobId>,
     /// Runs leased and not yet traced.
     pub(super) held: Vec<(JobId, Range<u64>)>,
@@ -51,6 +51,13 @@ impl Device {
 
     pub(super) fn holds(&self, job: JobId) -> bool {
         self.resident.contains(&job)
+    }
+
+    /// What it holds of a job was used.
+    pub(super) fn used(&mut self, job: JobId) {
+        if let Some(i) = self.resident.iter().position(|&j| j == job) {
+            self.resident[i..].rotate_left(1);
+        }
     }
 
     /// Takes frames out of what is leased to it; gives those that were.

@@ -21,6 +21,8 @@ pub(super) enum Place {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Estimate {
     pub(super) costs: Costs,
+    /// Bytes of its scene there.
+    pub(super) bytes: u64,
     pub(super) frames: u32,
     pub(super) starts: u32,
 }
@@ -39,7 +41,6 @@ pub(super) struct Failed {
 pub(super) struct Job {
     pub(super) total: u64,
     pub(super) grows: bool,
-    pub(super) bytes: u64,
     /// Its share beside others'.
     pub(super) weight: f64,
     pub(super) estimates: Vec<Estimate>,
@@ -74,12 +75,11 @@ impl Job {
         let estimate = |costs: &Costs| {
             // neither endless nor free, so that every formula is finite
             let (warm_s, cold_s) = (costs.warm_s.clamp(1e-6, 1e6), costs.cold_s.clamp(0.0, 1e6));
-            Estimate { costs: Costs { warm_s, cold_s, ..*costs }, frames: 0, starts: 0 }
+            Estimate { costs: Costs { warm_s, cold_s, ..*costs }, bytes: new.bytes, frames: 0, starts: 0 }
         };
         Self {
             total: new.frames,
             grows: new.grows,
-            bytes: new.bytes,
             weight: weight(new.priority),
             estimates: new.costs.iter().map(estimate).collect(),
             open,

@@ -161,20 +161,28 @@ impl Scheduler {
         if !one.estimates.iter().zip(&self.kinds).any(fits) {
             return false;
         }
-        one.bytes = one.bytes.max(bytes);
         for (estimate, kind) in one.estimates.iter_mut().zip(&self.kinds) {
-            estimate.costs.fits &= one.bytes <= kind.budget_bytes;
+            estimate.bytes = estimate.bytes.max(bytes);
+            estimate.costs.fits &= estimate.bytes <= kind.budget_bytes;
         }
         self.place(job.0, now_s);
         true
     }
 
-    /// A job's scene was made resident on a device, or evicted from it.
+    /// A job's scene is resident on a device, or is not.
     pub fn holds(&mut self, device: usize, job: JobId, is_resident: bool) {
-        let resident = &mut self.devices[device].resident;
-        resident.retain(|&j| j != job);
-        if is_resident {
-            resident.push(job);
+        let facing = &mut self.devices[device];
+        if facing.holds(job) != is_resident {
+            facing.resident.retain(|&j| j != job);
+            facing.resident.extend(is_resident.then_some(job));
+        }
+    }
+
+    /// Bytes that a job's scene takes on a device.
+    pub fn takes(&mut self, device: usize, job: JobId, bytes: u64) {
+        let kind = self.devices[device].facts.kind;
+        if let Some(one) = self.jobs.get_mut(job.0).and_then(Option::as_mut) {
+            one.estimates[kind].bytes = bytes;
         }
     }
 
@@ -214,6 +222,9 @@ impl Scheduler {
         one.leased += frames.end - frames.start;
         facing.serving = Some(Serving { next: frames.end, ..fresh });
         facing.held.push((JobId(choice.job), frames.clone()));
+        if !choice.is_cold {
+            facing.used(JobId(choice.job));
+        }
         self.place(choice.job, now_s);
         Some(Lease { job: JobId(choice.job), frames })
     }
@@ -350,7 +361,7 @@ impl Scheduler {
 
     pub(super) fn fits(&self, device: usize, job: &Job) -> bool {
         let facts = self.devices[device].facts;
-        job.estimates[facts.kind].costs.fits && job.bytes <= facts.budget_bytes
+        job.estimates[facts.kind].costs.fits && job.estimates[facts.kind].bytes <= facts.budget_bytes
     }
 
     fn alone_s(&self, job: &Job) -> f64 {

@@ -95,6 +95,22 @@ fn what_waits_is_not_left_for_another_copy_that_gains_less_than_it_costs() {
     assert_eq!(begin(&mut scheduler, 0.0, 1).unwrap().job, second);
 }
 
+/// Two devices of 100 bytes. One has begun a job of 1000 frames of 0.1 s with a cold start of 5 s, the other one of 100 with
+/// one of 0.1. To join saves that 5 s, and costs 8 · 5.1 · (1/5.1 + 1/55) · 0.1 / 2 = 0.44 s; 22 s where the long one must go for it.
+#[test]
+fn another_copy_counts_what_it_pushes_out() {
+    for (bytes, joins) in [(40, true), (60, false)] {
+        let mut scheduler = Scheduler::new(Policy::Affinity, &equal(2));
+        let long = scheduler.add(0.0, &NewJob { bytes, ..job(1000, 0.1, 5.0) }).unwrap();
+        let lease = begin(&mut scheduler, 0.0, 0).unwrap();
+        trace(&mut scheduler, 0, &lease, 0.1);
+        let short = scheduler.add(5.1, &NewJob { bytes, ..job(100, 0.1, 0.1) }).unwrap();
+        assert_eq!(begin(&mut scheduler, 5.1, 1).unwrap().job, short);
+        let next = scheduler.lease(5.1, 0).unwrap();
+        assert_eq!(next.job, if joins { short } else { long }, "{bytes} bytes");
+    }
+}
+
 #[test]
 fn what_comes_back_is_leased_again_and_what_failed_goes_elsewhere() {
     let mut scheduler = Scheduler::new(Policy::Affinity, &equal(2));

@@ -39,7 +39,7 @@ impl Resident {
         refuse_beyond(device, needed_bytes)?;
         let mut of_frame: HashMap<_, _> =
             frame.objects.iter().flat_map(|o| o.geometry.shared_parts()).collect();
-        self.residency.begin();
+        self.residency.begin(plan.run);
         let mut cost = UpdateCost::default();
         let start = Stopwatch::start();
         for step in &plan.steps {

@@ -158,7 +158,7 @@ impl Resident {
         for object in &frame.objects {
             of_frame.extend(object.geometry.parts().into_iter().map(|(name, _)| (name, &*object.geometry)));
         }
-        self.residency.begin();
+        self.residency.begin(plan.run);
         let mut cost = UpdateCost::default();
         let start = Stopwatch::start();
         for step in &plan.steps {

@@ -102,7 +102,7 @@ pub struct Outcome {
     pub fairness: f64,
     /// The longest that a job waited for its first frame to begin, in seconds.
     pub longest_wait_s: f64,
-    /// Scenes evicted that were needed again.
+    /// Scenes made resident again after they were evicted.
     pub evictions: f64,
     /// Times that a device held more than it may.
     pub over_budget: f64,

@@ -62,12 +62,13 @@ fn a_trace_runs_alike_each_time_and_no_rule_breaks_it() {
     }
 }
 
-/// What is claimed of affinity, over the means of eight traces of each family: the last frame at most 1.08 times as late as
-/// the bound and 1.05 as by the best of the others; the 95th percentile of slowdown no more than 1.05 times theirs, and on
-/// mixed traces 0.8.
+/// What is claimed of affinity, over the means of sixteen traces of each family: the last frame at most 1.08 times as late
+/// as the bound and 1.05 as by the best of the others; the 95th percentile of slowdown no more than 1.05 times theirs, and
+/// on mixed traces 0.8. Where each small job pushes the giant out, nobody has both: what ends soonest lets them wait for its
+/// end.
 #[test]
 fn affinity_ends_near_the_bound_and_keeps_slowdown_low() {
-    let seeds = 0..8;
+    let seeds = 0..16;
     for family in Family::ALL {
         let traces: Vec<Trace> = seeds.clone().map(|seed| family.trace(seed)).collect();
         let means = Contender::all().map(|contender| {
@@ -78,9 +79,11 @@ fn affinity_ends_near_the_bound_and_keeps_slowdown_low() {
         let [others @ .., affinity] = means;
         let best = |i: usize| others.iter().map(|m| m[i]).fold(f64::INFINITY, f64::min);
         let name = family.name();
-        assert!(affinity[0] <= 1.08 && affinity[0] <= 1.05 * best(0), "{name}: {affinity:?}, {others:?}");
-        let is_mixed = !matches!(family, Family::FewLong);
-        let most = if is_mixed { 0.8 } else { 1.05 };
-        assert!(affinity[1] <= most * best(1), "{name}: {affinity:?}, {others:?}");
+        let [latest, slowest] = match family {
+            Family::GiantAlone => [1.3, 0.5 * best(1)],
+            Family::FewLong => [(1.05 * best(0)).min(1.08), 1.05 * best(1)],
+            _ => [(1.05 * best(0)).min(1.08), 0.8 * best(1)],
+        };
+        assert!(affinity[0] <= latest && affinity[1] <= slowest, "{name}: {affinity:?}, {others:?}");
     }
 }

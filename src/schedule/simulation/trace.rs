@@ -82,11 +82,15 @@ pub enum Family {
     Fails,
     /// Mixed; frames and cold starts are thought to take up to three times more or less.
     WrongByThree,
+    /// Arrivals; a device has room for the largest scene and no more.
+    OneScene,
+    /// A giant scene, and small ones that come while it is traced; a device has room for it alone.
+    GiantAlone,
 }
 
 impl Family {
     /// All of them.
-    pub const ALL: [Self; 12] = [
+    pub const ALL: [Self; 14] = [
         Self::FewLong,
         Self::ManyShort,
         Self::Mixed,
@@ -99,6 +103,8 @@ impl Family {
         Self::Slows,
         Self::Fails,
         Self::WrongByThree,
+        Self::OneScene,
+        Self::GiantAlone,
     ];
 
     /// Its name.
@@ -113,6 +119,8 @@ impl Family {
             Self::Giant => "one giant",
             Self::Deadlines => "deadlines",
             Self::TwoScenes => "memory for two",
+            Self::OneScene => "memory for one",
+            Self::GiantAlone => "memory for the giant",
             Self::Slows => "one slows down",
             Self::Fails => "one fails",
             Self::WrongByThree => "estimates wrong",
@@ -142,16 +150,7 @@ impl Family {
                 }
                 Trace { jobs, devices: equal }
             }
-            Self::Arrivals => {
-                let mut jobs = mixed(&mut random, 60);
-                let pause_s = work_s(&jobs) / 60.0 / 4.0 / 0.7;
-                let mut at_s = 0.0;
-                for job in &mut jobs {
-                    job.arrives_s = at_s;
-                    at_s += random.exponential(pause_s);
-                }
-                Trace { jobs, devices: equal }
-            }
+            Self::Arrivals => Trace { jobs: arriving(&mut random), devices: equal },
             Self::Giant => {
                 let mut jobs = jobs(&mut random, 20, [20.0, 200.0]);
                 for job in &mut jobs {
@@ -174,6 +173,24 @@ impl Family {
                 let jobs = mixed(&mut random, 40);
                 let largest = jobs.iter().map(|j| j.bytes).max().unwrap_or(0);
                 let devices = vec![TraceDevice { budget_bytes: 2 * largest, ..device(1.0) }; 4];
+                Trace { jobs, devices }
+            }
+            Self::OneScene => {
+                let jobs = arriving(&mut random);
+                let largest = jobs.iter().map(|j| j.bytes).max().unwrap_or(0);
+                let devices = vec![TraceDevice { budget_bytes: largest, ..device(1.0) }; 4];
+                Trace { jobs, devices }
+            }
+            Self::GiantAlone => {
+                let Trace { mut jobs, .. } = Self::Giant.trace(seed);
+                jobs.swap(0, 10);
+                let pause_s = jobs[0].frames as f64 * jobs[0].warm_s / 4.0 / 20.0;
+                let mut at_s = 0.0;
+                for job in &mut jobs {
+                    job.arrives_s = at_s;
+                    at_s += random.exponential(pause_s);
+                }
+                let devices = vec![TraceDevice { budget_bytes: jobs[0].bytes, ..device(1.0) }; 4];
                 Trace { jobs, devices }
             }
             Self::Slows => {
@@ -228,6 +245,18 @@ fn jobs(random: &mut Random, count: usize, [least, most]: [f64; 2]) -> Vec<Trace
         }
     };
     (0..count).map(|_| job(random)).collect()
+}
+
+/// Mixed jobs that come one by one, at 70 % of what four devices can do.
+fn arriving(random: &mut Random) -> Vec<TraceJob> {
+    let mut jobs = mixed(random, 60);
+    let pause_s = work_s(&jobs) / 60.0 / 4.0 / 0.7;
+    let mut at_s = 0.0;
+    for job in &mut jobs {
+        job.arrives_s = at_s;
+        at_s += random.exponential(pause_s);
+    }
+    jobs
 }
 
 /// Seconds that a device of speed 1 would take for all of it.

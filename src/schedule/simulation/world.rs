@@ -4,7 +4,7 @@ use super::rule::Rule;
 use super::trace::Trace;
 use crate::schedule::order::Key;
 use std::cmp::Reverse;
-use std::collections::BinaryHeap;
+use std::collections::{BTreeSet, BinaryHeap};
 use std::ops::Range;
 
 /// What happened.
@@ -41,6 +41,8 @@ struct Place {
     held_bytes: u64,
     /// The last used at the end.
     held: Vec<usize>,
+    /// Evicted while frames were left.
+    evicted: BTreeSet<usize>,
     run: Option<Run>,
     runs: u64,
     is_present: bool,
@@ -74,6 +76,7 @@ pub(super) fn simulate(trace: &Trace, rule: &mut dyn Rule) -> Happened {
         speed: d.speed,
         held_bytes: 0,
         held: Vec::new(),
+        evicted: BTreeSet::new(),
         run: None,
         runs: 0,
         is_present: true,
@@ -173,13 +176,16 @@ impl World<'_> {
                 let ended = place.held.iter().position(|&held| self.left[held] == 0);
                 let out = place.held.remove(ended.unwrap_or(0));
                 place.held_bytes -= self.trace.jobs[out].bytes;
-                self.happened.evictions += u64::from(ended.is_none());
+                if ended.is_none() {
+                    place.evicted.insert(out);
+                }
                 self.rule.holds(device, out, false);
             }
             place.held_bytes = place.held_bytes.saturating_add(truth.bytes);
             self.happened.over_budget += u64::from(place.held_bytes > facts.budget_bytes);
             self.happened.bytes_moved += truth.bytes;
             self.happened.cold_starts += 1;
+            self.happened.evictions += u64::from(place.evicted.remove(&job));
             let slowness = facts.speed / place.speed;
             Some(truth.cold_s * facts.cold_factor() * slowness)
         };
