@@ -299,6 +299,15 @@ fn a_writer_dies(cut: impl Fn(&str) -> usize, state: &str) -> Daemon {
 }
 
 #[test]
+fn what_cannot_be_followed_waits_no_longer_than_without() {
+    // a span that it would have to rest thirty times
+    let mut daemon = Daemon::start("5");
+    let gltf = serde_json::json!({"asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [0]}], "nodes": [{}]});
+    fs::write(daemon.folder().join("still.gltf"), gltf.to_string()).unwrap();
+    daemon.until_state("finished");
+}
+
+#[test]
 fn a_writer_that_dies_within_a_line_that_needs_its_end() {
     let daemon = a_writer_dies(|text| text.rfind('-').unwrap() + 1, "failed");
     daemon.each_was_rendered_once(3);

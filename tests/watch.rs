@@ -366,6 +366,41 @@ fn a_running_daemon_sees_what_changes_and_what_is_cancelled() {
 }
 
 #[test]
+fn a_job_that_another_daemon_took_over_is_not_rendered_any_more() {
+    use std::io::{BufRead, BufReader};
+    use std::process::Stdio;
+    let w = Watched::new();
+    wave(&w.path("inbox/long"), 2, 6, 8);
+    // hours of work
+    let mut args = w.args(&["--samples", "60000", "--size", "640x360", "--json"]);
+    args.retain(|arg| arg != "--once");
+    let mut daemon =
+        common::rentix(w.t.path()).args(args).stdout(Stdio::piped()).stderr(Stdio::null()).spawn().unwrap();
+    let lines = BufReader::new(daemon.stdout.take().unwrap()).lines();
+    let events = lines.map(|line| serde_json::from_str::<serde_json::Value>(&line.unwrap()).unwrap());
+    let mut is_taken = false;
+    for event in events {
+        if event["event"] == "start" {
+            let claims = w.path("done/.rentix-watch/claims");
+            let lock = fs::read_dir(&claims).unwrap().map(|file| file.unwrap().path());
+            let lock = lock.into_iter().find(|file| file.extension().is_some_and(|e| e == "lock")).unwrap();
+            let next = lock.to_str().unwrap().replace(".0.lock", ".1.lock");
+            fs::write(claims.join("elsewhere.7.0.alive"), "").unwrap();
+            fs::write(next, "elsewhere.7.0").unwrap();
+            fs::remove_file(lock).unwrap();
+            is_taken = true;
+        }
+        if event["event"] == "end" {
+            break;
+        }
+    }
+    assert!(is_taken);
+    assert_eq!(w.status("long")["state"], "running", "what the other one writes stands");
+    daemon.kill().unwrap();
+    daemon.wait().unwrap();
+}
+
+#[test]
 #[cfg(unix)]
 fn a_daemon_tells_how_far_it_is_and_ends_when_it_is_asked() {
     use std::io::{BufRead, BufReader};

@@ -236,8 +236,13 @@ impl Daemon<'_> {
         }
         if settling.is_settled(span, now) && !is_rendering {
             self.accept(id, run);
-        } else if entry.session.as_ref().is_some_and(|s| s.fits.is_none() && !s.ready.is_empty()) {
-            self.see_whether_it_fits(id);
+        } else if let Some(session) = entry.session.as_mut().filter(|session| session.fits.is_none()) {
+            // what rests and has no frames of its own, as a glTF, is perhaps none that grows
+            let rests = settling.is_settled(settle, now) && session.asked != Some(seen.run);
+            if rests || !session.ready.is_empty() {
+                session.asked = Some(seen.run);
+                self.see_whether_it_fits(id);
+            }
         }
     }
 
@@ -257,6 +262,7 @@ impl Daemon<'_> {
 
     /// Whether a job that grows can be followed; where that cannot be told yet it is asked again.
     fn see_whether_it_fits(&mut self, id: u64) {
+        let now = self.now();
         let Some(entry) = self.entries.get(&id) else { return };
         let job = crate::watch::job::prepare(&self.place(entry), &self.defaults, true);
         let priority = self.options.priority;
@@ -266,6 +272,7 @@ impl Daemon<'_> {
         {
             session.fits = Some(crate::watch::follow_run::can_follow(&job));
             entry.status.priority = job.priority.unwrap_or(priority);
+            entry.due = now;
         }
     }
 

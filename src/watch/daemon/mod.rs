@@ -207,8 +207,18 @@ impl<'a> Daemon<'a> {
     fn beat(&mut self) {
         let now = self.now();
         match self.claims.beat(now) {
-            Ok(true) if !self.stopping => self.take_over_journals(now),
-            Ok(_) => {}
+            Ok(true) => {
+                for id in &self.current {
+                    // whoever has taken it over is heeded when it is to be written
+                    if let Some(entry) = self.entries.get_mut(id) {
+                        entry.dirty |= entry.claim.as_ref().is_some_and(|claim| !claim.stands());
+                    }
+                }
+                if !self.stopping {
+                    self.take_over_journals(now);
+                }
+            }
+            Ok(false) => {}
             Err(error) => self.in_the_way(&error.to_string()),
         }
     }

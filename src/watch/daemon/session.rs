@@ -20,8 +20,10 @@ pub(super) struct Session {
     handed: HashMap<OsString, Stamp>,
     /// Those that are whole and were not, each with how it stands.
     pub(super) ready: HashMap<OsString, Look>,
-    /// Whether it can be followed; None: not looked into yet.
+    /// Whether it can be followed; None: not looked into yet, or that could not be told.
     pub(super) fits: Option<bool>,
+    /// The set of files of which that was asked last.
+    pub(super) asked: Option<u128>,
     /// Frame files there.
     pub(super) all: u64,
     /// How long the last look parsed.

@@ -87,6 +87,9 @@ impl Daemon<'_> {
             // it was taken over by another daemon, to which this one seemed dead; what that one writes stands
             entry.claim = None;
             entry.hush();
+            if let Some(stop) = &entry.stop {
+                stop.ask();
+            }
             if entry.phase == Phase::Ended {
                 entry.phase = Phase::Settling;
             }
