@@ -220,7 +220,8 @@ pub fn plan_frame(frame: &Frame, residency: &Residency, wishes: &Wishes) -> Upda
     }
 
     let unused = |name: &PartHash| *cold || !used.contains(name) && !taken.contains(name);
-    let is_wanted = |held: &Held| held.again || held.run != wishes.run && wishes.others.contains(&held.run);
+    let is_wanted =
+        |held: &Held| if held.run == wishes.run { held.again } else { wishes.others.contains(&held.run) };
     let is_kept = |name: &PartHash, held: &Held| !cold && is_wanted(held) && !overwritten.contains(name);
     let (kept, freed): (Vec<_>, Vec<_>) =
         residency.held.iter().filter(|(name, _)| unused(name)).partition(|(name, held)| is_kept(name, held));

@@ -166,7 +166,8 @@ fn what_a_run_used_goes_when_it_has_ended_or_there_is_no_space() {
     let (a, b) = (strip(40, 0.0), strip(50, 0.0));
     let both = |others: &[u64], budget_bytes| {
         let mut residency = Residency::default();
-        apply(&mut residency, vec![a.clone()], &of_run(1, &[2], budget_bytes));
+        let comes_again = Wishes { used_again: vec![0], ..of_run(1, &[2], budget_bytes) };
+        apply(&mut residency, vec![a.clone()], &comes_again);
         let of_first = residency.bytes();
         apply(&mut residency, vec![b.clone()], &of_run(2, others, budget_bytes));
         assert!(holds(&residency, &b));
