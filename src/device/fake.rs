@@ -14,6 +14,8 @@ use std::collections::BTreeMap;
 pub enum Fault {
     /// [`DeviceError::OutOfMemory`] when its plan is applied.
     OutOfMemory,
+    /// [`DeviceError::MemoryFull`] when its plan is applied, unless all else is forgotten first.
+    MemoryFull,
     /// [`DeviceError::Lost`] when it is traced; from then on all calls fail so.
     Lost,
     /// A panic when it is traced.
@@ -96,8 +98,12 @@ impl Device for FakeDevice {
         if is_faulty || needed_bytes > self.info.budget_bytes {
             return Err(self.out_of_memory(needed_bytes));
         }
+        if self.faults.get(&frame.hash()) == Some(&Fault::MemoryFull) && !plan.is_cold {
+            let (device, what) = (self.info.name.clone(), "all".to_string());
+            return Err(DeviceError::MemoryFull { device, what, needed_bytes });
+        }
         let mut uploaded_bytes = 0;
-        self.residency.begin(plan.run);
+        self.residency.begin(plan);
         for step in &plan.steps {
             match *step {
                 Step::Free { name } => self.residency.free(name),
@@ -116,7 +122,7 @@ impl Device for FakeDevice {
                 }
             }
         }
-        self.residency.end(&plan.again);
+        self.residency.end(plan);
         Ok(UpdateCost { uploaded_bytes, ..UpdateCost::default() })
     }
 
@@ -129,7 +135,7 @@ impl Device for FakeDevice {
                 self.residency = Residency::default();
                 self.check_lost()?;
             }
-            Some(Fault::OutOfMemory) | None => {}
+            Some(Fault::OutOfMemory | Fault::MemoryFull) | None => {}
         }
         let is_resident = |o: &Object| self.residency.held.contains_key(&tree_name(&o.geometry));
         if let Some(object) = frame.objects.iter().position(|o| !is_resident(o)) {

@@ -4,7 +4,7 @@ mod policy;
 mod residency;
 
 pub use policy::{Costs, Update};
-pub use residency::{Held, Residency, TREE_BYTES_PER_TRIANGLE, TreeState};
+pub use residency::{Held, Residency, TREE_BYTES_PER_TRIANGLE, TreeState, User};
 
 use crate::scene::{Frame, Geometry, PartHash, PartHasher};
 use policy::{Choice, candidate, choose};
@@ -25,7 +25,7 @@ pub struct Wishes {
     pub costs: Costs,
     /// The run that the frame is of.
     pub run: u64,
-    /// Other runs that the device traces frames of in turn with it: what they used last is kept for them.
+    /// Other runs that the device traces frames of in turn with it: what they use is kept for them.
     pub others: BTreeSet<u64>,
 }
 
@@ -142,6 +142,10 @@ pub struct UpdatePlan {
     pub is_cold: bool,
     /// The run that the frame is of.
     pub run: u64,
+    /// The others that have frames left.
+    pub others: BTreeSet<u64>,
+    /// Whether no tree that it needs was there, nor one of its run.
+    pub is_start: bool,
     /// Parts and trees of the frame that frames to come use again.
     pub again: BTreeSet<PartHash>,
 }
@@ -168,7 +172,7 @@ pub fn tree_name(geometry: &Geometry) -> PartHash {
 
 /// Plans a frame: what is resident is kept, trees over meshes that only moved are refitted where that is expected to take
 /// less time, what is missing is uploaded or built. What the frame does not use is freed, but for what frames to come use
-/// again or other runs used last, and nothing overwrites: that is kept while there is space.
+/// again and nothing overwrites, and what other runs use: that is kept while there is space.
 pub fn plan_frame(frame: &Frame, residency: &Residency, wishes: &Wishes) -> UpdatePlan {
     let Wishes { cold, update, costs, .. } = wishes;
     let mut needed: BTreeMap<PartHash, u64> = BTreeMap::new();
@@ -179,6 +183,10 @@ pub fn plan_frame(frame: &Frame, residency: &Residency, wishes: &Wishes) -> Upda
     }
     let used: BTreeSet<PartHash> = needed.keys().chain(trees.keys()).copied().collect();
     let is_held = |name: &PartHash| !cold && residency.held.contains_key(name);
+    let is_others = |held: &Held| held.users.iter().any(|user| wishes.others.contains(&user.run));
+    let is_own = |name: &PartHash| {
+        residency.held.get(name).is_some_and(|held| held.users.iter().any(|user| user.run == wishes.run))
+    };
 
     // trees that are fitted to other positions, and those in whose place another is built
     let (mut taken, mut overwritten) = (BTreeSet::new(), BTreeSet::new());
@@ -193,9 +201,10 @@ pub fn plan_frame(frame: &Frame, residency: &Residency, wishes: &Wishes) -> Upda
             continue;
         }
         let is_free = |name: &PartHash| {
-            !cold && !used.contains(name) && !taken.contains(name) && !overwritten.contains(name)
+            let is_lent = !is_own(name) && residency.held.get(name).is_some_and(is_others);
+            !cold && !is_lent && !used.contains(name) && !taken.contains(name) && !overwritten.contains(name)
         };
-        let step = match candidate(residency, wishes.run, geometry.faces.hash(), triangles, is_free) {
+        let step = match candidate(residency, geometry.faces.hash(), triangles, is_free) {
             None => Step::Build { tree, object, triangles },
             Some(from) => {
                 let state = &residency.trees[&from];
@@ -220,9 +229,10 @@ pub fn plan_frame(frame: &Frame, residency: &Residency, wishes: &Wishes) -> Upda
     }
 
     let unused = |name: &PartHash| *cold || !used.contains(name) && !taken.contains(name);
-    let is_wanted =
-        |held: &Held| if held.run == wishes.run { held.again } else { wishes.others.contains(&held.run) };
-    let is_kept = |name: &PartHash, held: &Held| !cold && is_wanted(held) && !overwritten.contains(name);
+    let comes_again = |held: &Held| held.users.iter().any(|user| user.run == wishes.run && user.again);
+    let is_kept = |name: &PartHash, held: &Held| {
+        !cold && (is_others(held) || comes_again(held) && !overwritten.contains(name))
+    };
     let (kept, freed): (Vec<_>, Vec<_>) =
         residency.held.iter().filter(|(name, _)| unused(name)).partition(|(name, held)| is_kept(name, held));
     let mut steps = Vec::new();
@@ -244,10 +254,14 @@ pub fn plan_frame(frame: &Frame, residency: &Residency, wishes: &Wishes) -> Upda
     let kept = count(|s| matches!(s, Step::Keep { .. } | Step::Refit { .. }));
     let built = count(|s| matches!(s, Step::Build { .. }));
     let refitted = count(|s| matches!(s, Step::Refit { .. }));
+    let is_own_kept = steps.iter().any(|s| matches!(s, Step::Keep { name } if is_own(name)));
+    let has_tree = trees.keys().any(is_held) || refitted > 0;
     let (action, what) = if *cold {
-        (Action::Load, "everything is forgotten between frames (--cold)".to_string())
-    } else if kept == 0 && why.is_empty() {
-        (Action::Load, "nothing of it was resident".to_string())
+        (Action::Load, "everything is forgotten first".to_string())
+    } else if !is_own_kept && !has_tree && why.is_empty() {
+        let what =
+            if kept == 0 { "nothing of it was resident" } else { "only what other runs use was resident" };
+        (Action::Load, what.to_string())
     } else if built > 0 {
         (Action::Rebuild, format!("{built} of {} trees built", trees.len()))
     } else if refitted > 0 {
@@ -264,6 +278,8 @@ pub fn plan_frame(frame: &Frame, residency: &Residency, wishes: &Wishes) -> Upda
         predicted_ms,
         is_cold: *cold,
         run: wishes.run,
+        others: wishes.others.clone(),
+        is_start: *cold || !has_tree && !residency.holds_trees_of(wishes.run),
         again,
     }
 }

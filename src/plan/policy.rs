@@ -82,18 +82,17 @@ pub(super) fn choose(state: &TreeState, triangles: u64, update: Update, costs: &
 }
 
 /// The tree that may be refitted to a geometry: one over the same faces that the frame does not need as it is; of
-/// several one of the run's own, then the one used last, and of those the first.
+/// several the one used last, and of those the first.
 pub(super) fn candidate(
     residency: &Residency,
-    run: u64,
     faces: PartHash,
     triangles: u64,
     is_free: impl Fn(&PartHash) -> bool,
 ) -> Option<PartHash> {
     let fits = |s: &TreeState| s.faces == faces && s.triangles == triangles;
-    let used = |name: &PartHash| residency.held.get(name).map(|held| (held.run == run, held.last_used));
+    let last_used = |name: &PartHash| residency.held.get(name).map_or(0, |held| held.last_used);
     let names = residency.trees.iter().filter(|(name, s)| fits(s) && is_free(name)).map(|(name, _)| *name);
-    names.min_by_key(|name| (Reverse(used(name)), *name))
+    names.min_by_key(|name| (Reverse(last_used(name)), *name))
 }
 
 #[cfg(test)]

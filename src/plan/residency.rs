@@ -1,7 +1,8 @@
 //! What a device holds, and what of it was used when.
 
+use super::{Step, UpdatePlan};
 use crate::scene::{Geometry, PartHash};
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 
 /// What a tree is taken to need for each triangle before it is built; real scenes take 90 to 110.
 pub const TREE_BYTES_PER_TRIANGLE: u64 = 120;
@@ -53,16 +54,36 @@ impl TreeState {
 }
 
 /// A part or tree that is held.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Held {
     /// Its bytes.
     pub bytes: u64,
     /// The turn, counted in frames, in which it was used last.
     pub last_used: u64,
-    /// The run that used it last.
+    /// The runs whose last frame used it or whose frames to come will.
+    pub users: Vec<User>,
+}
+
+/// A run that uses what is held.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct User {
+    /// Its number.
     pub run: u64,
-    /// Whether a frame of that run that is known to come will use it.
+    /// Whether a frame of it that is known to come will.
     pub again: bool,
+}
+
+impl Held {
+    fn is_of(&self, run: u64) -> bool {
+        self.users.iter().any(|user| user.run == run)
+    }
+
+    fn used_by(&mut self, run: u64, turn: u64) {
+        self.last_used = turn;
+        if !self.is_of(run) {
+            self.users.push(User { run, again: false });
+        }
+    }
 }
 
 /// What a device holds: parts and trees, and the counts of the report.
@@ -94,24 +115,32 @@ impl Residency {
         self.bytes
     }
 
-    /// The turn of a run's frame begins.
-    pub fn begin(&mut self, run: u64) {
+    /// The turn of a frame begins: what its plan keeps is not idle from now on.
+    pub fn begin(&mut self, plan: &UpdatePlan) {
         self.turn += 1;
-        self.run = run;
+        self.run = plan.run;
+        for step in &plan.steps {
+            if let Step::Keep { name } | Step::Refit { from: name, .. } = step
+                && let Some(held) = self.held.get_mut(name)
+            {
+                held.last_used = self.turn;
+            }
+        }
     }
 
     /// A part or tree was there when a frame needed it.
     pub fn keep(&mut self, name: PartHash) {
         self.hits += 1;
         if let Some(held) = self.held.get_mut(&name) {
-            (held.last_used, held.run) = (self.turn, self.run);
+            held.used_by(self.run, self.turn);
         }
     }
 
     /// A part or tree was not there and is now held.
     pub fn hold(&mut self, name: PartHash, bytes: u64) {
         self.misses += 1;
-        let held = Held { bytes, last_used: self.turn, run: self.run, again: false };
+        let users = vec![User { run: self.run, again: false }];
+        let held = Held { bytes, last_used: self.turn, users };
         let before = self.held.insert(name, held);
         self.bytes = self.bytes + bytes - before.map_or(0, |held| held.bytes);
         self.peak_bytes = self.peak_bytes.max(self.bytes);
@@ -127,7 +156,8 @@ impl Residency {
     pub fn refit(&mut self, from: PartHash, to: PartHash, geometry: &Geometry, cost: f64) {
         self.hits += 1;
         if let (Some(held), Some(state)) = (self.held.remove(&from), self.trees.remove(&from)) {
-            let before = self.held.insert(to, Held { last_used: self.turn, run: self.run, ..held });
+            let users = vec![User { run: self.run, again: false }];
+            let before = self.held.insert(to, Held { last_used: self.turn, users, ..held });
             self.bytes -= before.map_or(0, |held| held.bytes);
             self.trees.insert(to, state.refitted(geometry, cost));
         }
@@ -145,12 +175,19 @@ impl Residency {
         self.free(name);
     }
 
-    /// The frame's turn ends: which of what it uses will be used again.
-    pub fn end(&mut self, again: &BTreeSet<PartHash>) {
+    /// The frame's turn ends: which of what it uses its run will use again, and what it does not need any more.
+    pub fn end(&mut self, plan: &UpdatePlan) {
         for (name, held) in &mut self.held {
-            if held.last_used == self.turn {
-                held.again = again.contains(name);
-            }
+            let is_used = held.last_used == self.turn;
+            held.users.retain_mut(|user| {
+                if user.run != plan.run {
+                    return plan.others.contains(&user.run);
+                }
+                if is_used {
+                    user.again = plan.again.contains(name);
+                }
+                is_used || user.again
+            });
         }
     }
 
@@ -166,7 +203,7 @@ impl Residency {
 
     /// Whether a run would find a tree of its own.
     pub fn holds_trees_of(&self, run: u64) -> bool {
-        self.trees.keys().any(|name| self.held.get(name).is_some_and(|held| held.run == run))
+        self.trees.keys().any(|name| self.held.get(name).is_some_and(|held| held.is_of(run)))
     }
 
     /// What this turn's frame does not use, the least recently used first.

@@ -5,6 +5,7 @@ use super::share::Hub;
 use crate::device::{Device, DeviceInfo};
 use crate::schedule::{DeviceFacts, Policy};
 use parking_lot::{FairMutex, FairMutexGuard};
+use std::time::Duration;
 
 /// Devices, and who has which of them when.
 pub struct Fleet {
@@ -53,5 +54,10 @@ impl Shared {
     /// Waits until no other run has it.
     pub(super) fn take(&self) -> FairMutexGuard<'_, Held> {
         self.held.lock()
+    }
+
+    /// The same, for so long.
+    pub(super) fn take_within(&self, time: Duration) -> Option<FairMutexGuard<'_, Held>> {
+        self.held.try_lock_for(time)
     }
 }

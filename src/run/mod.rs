@@ -7,6 +7,7 @@ mod check;
 mod costs;
 mod estimate;
 pub mod event;
+mod failure;
 mod fleet;
 mod forecast;
 pub mod machine;
@@ -243,7 +244,8 @@ pub fn render(
     });
 
     let peak_bytes = machine::peak_rss_bytes();
-    if peak_bytes > peak_before {
+    // what others take is not this one's
+    if peak_bytes > peak_before && !share.has_others() {
         estimator.took(peak_bytes.saturating_sub(rss_before));
     }
     if let Some(store) = store {

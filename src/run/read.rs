@@ -80,6 +80,7 @@ pub(super) fn read_stage(
         if !warnings.is_empty() {
             let _ = note.send(Note::Warnings(warnings));
         }
+        share.was_read(turn.device);
         if to_devices[turn.device].send(Read { turn, bytes, outcome }).is_err() {
             return;
         }

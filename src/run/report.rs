@@ -85,14 +85,24 @@ impl DeviceReport {
         }
     }
 
-    /// Takes over what the device holds now.
+    /// Adds what it did in another run.
+    pub fn add(&mut self, other: &Self) {
+        self.frames += other.frames;
+        self.busy_s += other.busy_s;
+        let (all, one) = (&mut self.resident, &other.resident);
+        all.hits += one.hits;
+        all.misses += one.misses;
+        all.evictions += one.evictions;
+        all.peak = all.peak.max(one.peak);
+        if other.frames > 0 {
+            all.bytes = one.bytes;
+        }
+    }
+
+    /// Takes over how much the device holds now.
     pub fn holds(&mut self, device: &dyn Device) {
-        let r = device.residency();
-        self.resident.bytes = r.bytes();
-        self.resident.peak = r.peak_bytes;
-        self.resident.hits = r.hits;
-        self.resident.misses = r.misses;
-        self.resident.evictions = r.evictions;
+        self.resident.bytes = device.residency().bytes();
+        self.resident.peak = device.residency().peak_bytes;
     }
 }
 

@@ -6,11 +6,14 @@ use crate::device::Stop;
 use crate::schedule::{Costs, DeviceFacts, JobId, Lease, NewJob, Policy, ScheduleError, Scheduler};
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
+use std::time::Duration;
 
 /// Frames that are read ahead of a device keep it so long from other runs, s; two of them always, so that one is read while the
 /// other is traced.
 const AHEAD_S: f64 = 0.2;
 const AHEAD_LEAST: u64 = 2;
+/// A reader that waits looks so often whether to stop.
+const LOOKS_FOR_STOP: Duration = Duration::from_millis(100);
 /// On so many devices a frame is tried.
 const TRIES: usize = 2;
 
@@ -49,22 +52,41 @@ struct Feed {
     lease: Option<Lease>,
     /// Frames that readers took for it.
     given: u64,
+    /// Those of them that were read.
+    read: u64,
     /// Those that it took of them.
     taken: u64,
     /// Those that left it.
     left: u64,
+    /// Since when it has had nothing to trace, s, where it has nothing.
+    idle_s: f64,
     is_gone: bool,
 }
 
 /// One of the runs.
 #[derive(Debug)]
 struct Run {
-    /// For each device the frames that its readers took, those of them that the device took, and those that left it.
-    turns: Vec<[u64; 3]>,
+    /// For each device what becomes of its frames.
+    turns: Vec<Turns>,
+    /// Readers that wait for a frame.
+    waiting: usize,
     /// Frames that are neither traced nor given up.
     left: u64,
     /// Frames that failed, and the devices they failed on.
     failed: HashMap<usize, Vec<usize>>,
+}
+
+/// Frames of a run for one device.
+#[derive(Clone, Copy, Debug, Default)]
+struct Turns {
+    /// Those that readers took.
+    given: u64,
+    /// Those of them that were read.
+    read: u64,
+    /// Those that the device took.
+    taken: u64,
+    /// Those that left it.
+    left: u64,
 }
 
 impl Hub {
@@ -100,11 +122,8 @@ pub(super) struct Share<'a> {
 impl Drop for Share<'_> {
     fn drop(&mut self) {
         self.hub.change(|s| {
-            s.scheduler.cancel(self.job);
+            s.give_up(self.job);
             s.runs.remove(&self.job);
-            for feed in &mut s.feeds {
-                feed.lease.take_if(|lease| lease.job == self.job);
-            }
         });
     }
 }
@@ -125,9 +144,9 @@ impl<'a> Share<'a> {
         let now_s = hub.clock.s();
         let frames = frames as u64;
         let job = hub.change(|s| {
-            let turns = vec![[0; 3]; s.feeds.len()];
+            let turns = vec![Turns::default(); s.feeds.len()];
             let job = s.scheduler.add(now_s, &NewJob { frames, grows: false, priority, costs, bytes: 0 })?;
-            s.runs.insert(job, Run { turns, left: frames, failed: HashMap::new() });
+            s.runs.insert(job, Run { turns, waiting: 0, left: frames, failed: HashMap::new() });
             Ok(job)
         })?;
         Ok(Self { hub, job, ahead: ahead as u64, budget_bytes })
@@ -137,7 +156,11 @@ impl<'a> Share<'a> {
     pub(super) fn next(&self, stop: &Stop) -> Option<Turn> {
         let mut state = self.hub.lock();
         loop {
-            if stop.asked() || state.scheduler.is_done(self.job) {
+            if stop.asked() {
+                state.give_up(self.job);
+                break;
+            }
+            if state.scheduler.is_done(self.job) {
                 break;
             }
             let (turn, others) = state.next(self.job, self.hub.clock.s(), self.ahead);
@@ -147,11 +170,16 @@ impl<'a> Share<'a> {
             if turn.is_some() {
                 return turn;
             }
-            if state.feeds.iter().all(|feed| feed.given == feed.left && feed.lease.is_none()) {
+            let is_still = |feed: &Feed| feed.given == feed.left && feed.lease.is_none();
+            if state.runs.len() == 1 && state.feeds.iter().all(is_still) {
                 // nothing is on its way that could change anything
                 break;
             }
-            state = self.hub.changed.wait(state).unwrap_or_else(PoisonError::into_inner);
+            state.waits(self.job, true);
+            // nobody is told of a stop
+            let waited = self.hub.changed.wait_timeout(state, LOOKS_FOR_STOP);
+            state = waited.unwrap_or_else(PoisonError::into_inner).0;
+            state.waits(self.job, false);
         }
         drop(state);
         // the other readers must come to this point too
@@ -163,11 +191,20 @@ impl<'a> Share<'a> {
     /// it are done, and those behind it wait for it.
     pub(super) fn take_bytes(&self, turn: Turn, bytes: u64) {
         let is_held_up = |s: &mut State| {
-            let [_, taken, _] = s.runs[&self.job].turns[turn.device];
+            let Turns { taken, .. } = s.runs[&self.job].turns[turn.device];
             taken < turn.place && s.bytes.saturating_add(bytes) > self.budget_bytes
         };
         let waited = self.hub.changed.wait_while(self.hub.lock(), is_held_up);
         waited.unwrap_or_else(PoisonError::into_inner).bytes += bytes;
+    }
+
+    /// A frame was read for a device.
+    pub(super) fn was_read(&self, device: usize) {
+        let mut state = self.hub.lock();
+        state.feeds[device].read += 1;
+        if let Some(run) = state.runs.get_mut(&self.job) {
+            run.turns[device].read += 1;
+        }
     }
 
     /// A frame has left its device's stage.
@@ -179,14 +216,15 @@ impl<'a> Share<'a> {
     pub(super) fn taken(&self, device: usize) {
         self.change(|s, run| {
             s.feeds[device].taken += 1;
-            run.turns[device][1] += 1;
+            run.turns[device].taken += 1;
         });
     }
 
     /// A frame is traced, in so many seconds of its device; or ended where it was read, in none.
     pub(super) fn done(&self, device: usize, index: usize, seconds: f64) {
+        let now_s = self.hub.clock.s();
         self.change(|s, run| {
-            s.leaves(run, device);
+            s.leaves(run, device, now_s);
             if s.scheduler.done(device, self.job, index as u64, seconds) {
                 run.left -= 1;
             }
@@ -202,6 +240,11 @@ impl<'a> Share<'a> {
     /// Its name among the runs that share the devices.
     pub(super) fn run(&self) -> u64 {
         self.job.0 as u64
+    }
+
+    /// Whether there are others.
+    pub(super) fn has_others(&self) -> bool {
+        self.hub.lock().runs.len() > 1
     }
 
     /// The names of the others.
@@ -224,13 +267,13 @@ impl<'a> Share<'a> {
     pub(super) fn failed(&self, device: usize, index: usize) -> bool {
         let now_s = self.hub.clock.s();
         self.change(|s, run| {
-            s.leaves(run, device);
+            s.leaves(run, device, now_s);
             let tried = run.failed.entry(index).or_default();
             tried.push(device);
-            let is_other = |(d, feed): (usize, &Feed)| !feed.is_gone && !tried.contains(&d);
-            let has_other = tried.len() < TRIES && s.feeds.iter().enumerate().any(is_other);
+            let may_try = tried.len() < TRIES;
             let frame = index as u64;
             s.scheduler.give_back(now_s, device, self.job, frame..frame + 1, true);
+            let has_other = may_try && s.scheduler.has_other(self.job, frame);
             if !has_other {
                 s.scheduler.give_up(self.job, frame);
                 run.left -= 1;
@@ -246,12 +289,14 @@ impl<'a> Share<'a> {
             if !s.scheduler.needs(now_s, self.job, bytes) {
                 return false;
             }
-            s.leaves(run, device);
+            s.leaves(run, device, now_s);
             let frame = index as u64;
             s.scheduler.give_back(now_s, device, self.job, frame..frame + 1, false);
             if let Some(lease) = s.feeds[device].lease.take_if(|lease| lease.job == self.job) {
                 s.scheduler.give_back(now_s, device, self.job, lease.frames, false);
             }
+            // what failed elsewhere and does not fit here either
+            run.left -= s.scheduler.give_up_hopeless(self.job);
             true
         })
     }
@@ -260,7 +305,7 @@ impl<'a> Share<'a> {
     pub(super) fn gave_back(&self, device: usize, index: usize) {
         let now_s = self.hub.clock.s();
         self.change(|s, run| {
-            s.leaves(run, device);
+            s.leaves(run, device, now_s);
             let frame = index as u64;
             s.scheduler.give_back(now_s, device, self.job, frame..frame + 1, false);
         });
@@ -269,7 +314,7 @@ impl<'a> Share<'a> {
     /// A device will take no more frames. False where it is the last one: then it must.
     pub(super) fn gone(&self, device: usize) -> bool {
         let now_s = self.hub.clock.s();
-        self.change(|s, _| {
+        self.change(|s, run| {
             if s.feeds.iter().filter(|feed| !feed.is_gone).count() <= 1 {
                 return false;
             }
@@ -277,6 +322,7 @@ impl<'a> Share<'a> {
             feed.is_gone = true;
             feed.lease = None;
             s.scheduler.device_gone(now_s, device);
+            run.left -= s.scheduler.give_up_hopeless(self.job);
             true
         })
     }
@@ -304,22 +350,69 @@ impl<'a> Share<'a> {
 
 impl State {
     /// A frame of a run has left a device's stage.
-    fn leaves(&mut self, run: &mut Run, device: usize) {
+    fn leaves(&mut self, run: &mut Run, device: usize, now_s: f64) {
         self.feeds[device].left += 1;
-        run.turns[device][2] += 1;
+        self.feeds[device].idle_s = now_s;
+        run.turns[device].left += 1;
     }
 
-    /// Whether a device has enough ahead of it.
-    fn is_fed(&self, device: usize, ahead: u64) -> bool {
+    /// A reader of a run waits for a frame, or does no more.
+    fn waits(&mut self, job: JobId, does: bool) {
+        if let Some(run) = self.runs.get_mut(&job) {
+            run.waiting = if does { run.waiting + 1 } else { run.waiting - 1 };
+        }
+    }
+
+    /// Nothing more of a run is leased.
+    fn give_up(&mut self, job: JobId) {
+        self.scheduler.cancel(job);
+        for feed in &mut self.feeds {
+            feed.lease.take_if(|lease| lease.job == job);
+        }
+    }
+
+    /// Whether a device has enough ahead of it for a run to add nothing. What others are still reading is not counted in
+    /// seconds: reading may take longer than they do.
+    fn is_fed(&self, device: usize, job: JobId, ahead: u64) -> bool {
         let feed = &self.feeds[device];
-        if feed.is_gone || feed.given - feed.taken >= ahead {
+        let own = self.runs.get(&job).map_or(Turns::default(), |run| run.turns[device]);
+        let ready = feed.read - feed.taken;
+        let reading = own.given - own.read;
+        if feed.is_gone || ready + reading >= ahead {
             return true;
         }
-        let on_their_way = |(job, run): (&JobId, &Run)| {
-            let [given, _, left] = run.turns[device];
-            (given - left) as f64 * self.scheduler.frame_s(device, *job)
+        let on_their_way = |(other, run): (&JobId, &Run)| {
+            let Turns { given, read, left, .. } = run.turns[device];
+            let frames = if *other == job { given } else { read } - left;
+            frames as f64 * self.scheduler.frame_s(device, *other)
         };
-        feed.given - feed.left >= AHEAD_LEAST && self.runs.iter().map(on_their_way).sum::<f64>() > AHEAD_S
+        let frames = feed.read - feed.left + reading;
+        frames >= AHEAD_LEAST && self.runs.iter().map(on_their_way).sum::<f64>() > AHEAD_S
+    }
+
+    /// Whether a device has had nothing to trace for so long that whoever can read for it has it, whatever was leased to runs
+    /// whose readers are all busy.
+    fn starves(&self, device: usize, now_s: f64) -> bool {
+        let feed = &self.feeds[device];
+        feed.read == feed.left && now_s - feed.idle_s > AHEAD_S
+    }
+
+    /// Leases to a run; one that asks has a reader for it.
+    fn lease(&mut self, device: usize, job: JobId, now_s: f64) {
+        let starves = self.starves(device, now_s);
+        for (&other, run) in &self.runs {
+            self.scheduler.can_be_read(other, !starves || other == job || run.waiting > 0);
+        }
+        let runs = &self.runs;
+        let is_unread =
+            |lease: &mut Lease| lease.job != job && runs.get(&lease.job).is_none_or(|run| run.waiting == 0);
+        let lease = &mut self.feeds[device].lease;
+        if starves && let Some(unread) = lease.take_if(is_unread) {
+            self.scheduler.give_back(now_s, device, unread.job, unread.frames, false);
+        }
+        if lease.is_none() {
+            *lease = self.scheduler.lease(now_s, device);
+        }
     }
 
     /// The next frame of a run, for the device that has the fewest ahead of it; and whether others were leased to other runs,
@@ -327,20 +420,23 @@ impl State {
     fn next(&mut self, job: JobId, now_s: f64, ahead: u64) -> (Option<Turn>, bool) {
         let mut others = false;
         let mut hungry: Vec<usize> = (0..self.feeds.len()).collect();
-        hungry.retain(|&d| !self.is_fed(d, ahead));
+        hungry.retain(|&d| !self.is_fed(d, job, ahead));
         hungry.sort_by_key(|&d| self.feeds[d].given - self.feeds[d].taken);
         for device in hungry {
-            if self.feeds[device].lease.is_none() {
-                self.feeds[device].lease = self.scheduler.lease(now_s, device);
-                others |= self.feeds[device].lease.as_ref().is_some_and(|lease| lease.job != job);
-            }
+            let before = self.feeds[device].lease.as_ref().map(|lease| lease.job);
+            self.lease(device, job, now_s);
             let feed = &mut self.feeds[device];
+            others |= feed.lease.as_ref().is_some_and(|lease| lease.job != job && Some(lease.job) != before);
             let Some(lease) = feed.lease.as_mut().filter(|lease| lease.job == job) else { continue };
             let Some(frame) = lease.frames.next() else { continue };
-            feed.lease.take_if(|lease| lease.frames.is_empty());
+            // another's readers may have waited for it to end
+            others |= feed.lease.take_if(|lease| lease.frames.is_empty()).is_some();
+            if feed.given == feed.left {
+                feed.idle_s = now_s;
+            }
             feed.given += 1;
             let Some(run) = self.runs.get_mut(&job) else { break };
-            let [given, ..] = &mut run.turns[device];
+            let given = &mut run.turns[device].given;
             *given += 1;
             return (Some(Turn { device, index: frame as usize, place: *given - 1 }), others);
         }
@@ -349,130 +445,4 @@ impl State {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    const COSTS: Costs = Costs { warm_s: 0.01, cold_s: 0.0, fits: true };
-
-    fn hub(devices: usize) -> Hub {
-        let facts = |kind| DeviceFacts { budget_bytes: 1 << 30, kind };
-        Hub::new(Policy::Affinity, &(0..devices).map(facts).collect::<Vec<_>>())
-    }
-
-    fn share(hub: &Hub, frames: usize, ahead: usize, budget_bytes: u64) -> Share<'_> {
-        let costs = vec![COSTS; hub.lock().feeds.len()];
-        Share::new(hub, frames, 0, costs, ahead, budget_bytes).unwrap()
-    }
-
-    #[test]
-    fn every_frame_is_given_once_and_in_order_on_each_device() {
-        let (hub, stop) = (hub(2), Stop::default());
-        let share = share(&hub, 100, 3, u64::MAX);
-        let (mut seen, mut turns) = (vec![0; 100], [0; 2]);
-        while let Some(turn) = share.next(&stop) {
-            assert_eq!(turn.place, turns[turn.device]);
-            turns[turn.device] += 1;
-            seen[turn.index] += 1;
-            share.taken(turn.device);
-            share.done(turn.device, turn.index, 0.01);
-        }
-        assert_eq!(seen, [1; 100]);
-        assert_eq!(share.left(), 0);
-    }
-
-    #[test]
-    fn a_frame_that_fails_goes_to_another_device_and_fails_on_two() {
-        let (hub, stop) = (hub(3), Stop::default());
-        let share = share(&hub, 1, 3, u64::MAX);
-        let first = share.next(&stop).unwrap();
-        share.taken(first.device);
-        assert!(share.failed(first.device, 0), "another one tries it");
-        let second = share.next(&stop).unwrap();
-        assert_ne!(second.device, first.device);
-        share.taken(second.device);
-        assert!(!share.failed(second.device, 0), "two have tried it");
-        assert_eq!(share.next(&stop), None);
-    }
-
-    #[test]
-    fn what_a_device_that_is_gone_had_goes_to_the_other() {
-        let (hub, stop) = (hub(2), Stop::default());
-        let share = share(&hub, 10, 2, u64::MAX);
-        let first = share.next(&stop).unwrap();
-        assert!(share.gone(first.device));
-        share.gave_back(first.device, first.index);
-        let mut seen = vec![0; 10];
-        while let Some(turn) = share.next(&stop) {
-            assert_ne!(turn.device, first.device);
-            seen[turn.index] += 1;
-            share.taken(turn.device);
-            share.done(turn.device, turn.index, 0.01);
-        }
-        assert_eq!(seen, [1; 10]);
-        assert!(!share.gone(1 - first.device), "the last one must go on");
-    }
-
-    #[test]
-    fn only_what_is_leased_to_another_run_wakes_its_readers() {
-        let hub = hub(1);
-        let (one, other) = (share(&hub, 10, 1, u64::MAX), share(&hub, 10, 1, u64::MAX));
-        let next = |share: &Share| hub.lock().next(share.job, hub.clock.s(), 1);
-        let (mine, wakes) = next(&one);
-        assert!(mine.is_some() != wakes, "the device's first frames are of one of them");
-        let waits = if wakes { &one } else { &other };
-        // the device has enough ahead of it, or its lease is the other's: nothing that anybody must hear of
-        assert_eq!((next(waits), next(waits)), ((None, false), (None, false)));
-    }
-
-    #[test]
-    fn the_frame_whose_turn_it_is_is_never_held_up() {
-        let (hub, stop) = (hub(1), Stop::default());
-        let share = share(&hub, 4, 2, 100);
-        let first = share.next(&stop).unwrap();
-        let second = share.next(&stop).unwrap();
-        // the second came first, the first does not fit beside it, and goes on all the same
-        share.take_bytes(second, 90);
-        share.take_bytes(first, 50);
-        share.taken(0);
-        share.give_bytes(50);
-        share.done(0, first.index, 0.01);
-        let third = share.next(&stop).unwrap();
-        std::thread::scope(|scope| {
-            let waits = scope.spawn(|| share.take_bytes(third, 20));
-            share.taken(0);
-            share.give_bytes(90);
-            waits.join().unwrap();
-        });
-        assert_eq!(hub.lock().bytes, 20);
-    }
-
-    #[test]
-    fn runs_take_turns_and_one_that_ends_leaves_nothing_behind() {
-        let (hub, stop) = (hub(1), Stop::default());
-        let long = share(&hub, 1000, 3, u64::MAX);
-        let first = long.next(&stop).unwrap();
-        long.taken(0);
-        long.done(0, first.index, 0.01);
-        let short = share(&hub, 5, 3, u64::MAX);
-        // what the device has leased is the long one's; then the short one has its turn
-        let mut before = 0;
-        let mut done = 0;
-        while done < 5 {
-            let (next, _) = hub.lock().next(short.job, hub.clock.s(), 3);
-            if let Some(turn) = next {
-                short.taken(0);
-                short.done(0, turn.index, 0.01);
-                done += 1;
-                continue;
-            }
-            let turn = long.next(&stop).unwrap();
-            long.taken(0);
-            long.done(0, turn.index, 0.01);
-            before += 1;
-        }
-        assert!(before < 100, "{before} frames of the long run went first");
-        drop(long);
-        assert_eq!(short.next(&stop), None);
-        assert!(hub.lock().feeds[0].lease.is_none() && hub.lock().runs.len() == 1);
-    }
-}
+mod tests;

@@ -112,6 +112,28 @@ fn a_lost_device_fails_what_comes_after_it() {
         .collect();
     assert_eq!(statuses(&outcome), want);
     assert!(outcome.failed().all(|f| f.device_failed));
+    let last = outcome.failed().last().and_then(|f| f.error.clone()).unwrap();
+    assert!(last.contains("it is not tried any more"), "{last}");
+}
+
+#[test]
+fn a_frame_that_is_refused_leaves_what_the_device_holds() {
+    let t = tempfile::tempdir().unwrap();
+    let outcome = run(&sequence(t.path()), &[(2, Fault::OutOfMemory)], &two_threads());
+    assert_eq!(statuses(&outcome)[2], (Some(3), Status::Failed));
+    let loads = outcome.report.frames.iter().filter(|f| f.update.action == Some("load"));
+    assert_eq!(loads.map(|f| f.frame).collect::<Vec<_>>(), [Some(1)]);
+}
+
+#[test]
+fn a_frame_without_room_is_tried_on_an_empty_device() {
+    let t = tempfile::tempdir().unwrap();
+    let outcome = run(&sequence(t.path()), &[(2, Fault::MemoryFull)], &two_threads());
+    assert_eq!(outcome.report.totals.rendered, FRAMES as u64, "{:?}", statuses(&outcome));
+    let loads = outcome.report.frames.iter().filter(|f| f.update.action == Some("load"));
+    assert_eq!(loads.map(|f| f.frame).collect::<Vec<_>>(), [Some(1), Some(3)]);
+    let residency = &outcome.report.devices[0].resident;
+    assert!(residency.hits > 0 && residency.misses > 0, "{residency:?}");
 }
 
 #[test]

@@ -3,11 +3,12 @@
 use super::costs::Learned;
 use super::estimate::{DeviceWork, Estimator, Rays};
 use super::event::{Status, UpdateReport};
+use super::failure::{Failure, caught};
 use super::fleet::{Held, Shared};
 use super::read::{Read, ReadFrame};
 use super::report::DeviceReport;
 use super::share::Share;
-use super::{Note, RunOptions, Shown, panic_text};
+use super::{Note, RunOptions, Shown};
 use crate::clock::Stopwatch;
 use crate::device::{DeviceError, Output, Stop, Traced, UpdateCost};
 use crate::diff::changes;
@@ -18,10 +19,10 @@ use crate::scene::{Frame, PartHash};
 use crate::warning::Warnings;
 use parking_lot::FairMutexGuard;
 use std::collections::{BTreeMap, VecDeque};
-use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
 use std::sync::Arc;
-use std::sync::mpsc::{Receiver, Sender, SyncSender, TryRecvError};
+use std::sync::mpsc::{Receiver, Sender, SyncSender, TryRecvError, TrySendError};
+use std::time::Duration;
 
 /// Takes frames in their order, makes each resident, traces it and hands the film to a writer. As many frames are under way
 /// as the device takes; where no other is read yet, the first of them is waited for.
@@ -41,6 +42,8 @@ pub(super) fn device_stage(
         update: options.update,
         learned: Learned::new(),
         losses: 0,
+        in_vain: false,
+        shown: VecDeque::new(),
         clock: Stopwatch::start(),
         ended_s: 0.0,
         warnings: Warnings::default(),
@@ -59,7 +62,7 @@ pub(super) fn device_stage(
                 waiting.insert(read.turn.place, read);
             }
             Err(TryRecvError::Empty) => {
-                stage.finish_first();
+                stage.finish(true);
                 continue;
             }
             Err(TryRecvError::Disconnected) => break,
@@ -83,7 +86,7 @@ pub(super) fn device_stage(
         }
     }
     while !stage.under_way.is_empty() {
-        stage.finish_first();
+        stage.finish(true);
     }
 }
 
@@ -99,8 +102,10 @@ pub(super) struct Ends<'a> {
     pub(super) note: &'a Sender<Note>,
 }
 
-/// After so many losses one after the other a device is given up where there is another.
+/// After so many losses one after the other a device is given up.
 const LOSSES: usize = 3;
+/// Who waits for a device looks so often whether to stop.
+const LOOKS_FOR_STOP: Duration = Duration::from_millis(100);
 
 struct DeviceStage<'a> {
     shared: &'a Shared,
@@ -116,6 +121,10 @@ struct DeviceStage<'a> {
     learned: Learned,
     /// Frames in a row with which it was lost.
     losses: usize,
+    /// Whether a frame had no room on the device for itself alone, either; then the next ones are not tried so.
+    in_vain: bool,
+    /// Films that wait for a writer, the first one first.
+    shown: VecDeque<Shown>,
     clock: Stopwatch,
     /// When it last finished a frame.
     ended_s: f64,
@@ -139,8 +148,14 @@ struct UnderWay {
 struct Begun {
     work: DeviceWork,
     cost: UpdateCost,
-    /// Whether the device held no tree of the run.
+    /// Whether no tree of it or of its run was there.
     is_start: bool,
+}
+
+impl UnderWay {
+    fn not_begun(read: ReadFrame, bytes: u64) -> Self {
+        Self { read, bytes, begun: Begun::default(), begun_s: 0.0 }
+    }
 }
 
 /// A frame, and what came of it: None while it is under way.
@@ -150,25 +165,13 @@ struct Before {
     film: Option<Arc<LatentFilm>>,
 }
 
-/// Why there is no film: an error of the device, or the text of a panic.
-enum Failure {
-    Device(DeviceError),
-    Panic(String),
-}
-
-impl Failure {
-    fn is_lost(&self) -> bool {
-        matches!(self, Self::Device(DeviceError::Lost { .. }))
-    }
-}
-
 impl DeviceStage<'_> {
     /// Begins a frame; before that finishes others, where the device takes no more.
     fn take(&mut self, mut read: ReadFrame, bytes: u64) {
         let is_copy = |before: &Before| before.fingerprint == read.fingerprint;
         if !self.cold && self.before.as_ref().is_some_and(is_copy) {
             while !self.under_way.is_empty() {
-                self.finish_first();
+                self.finish(true);
             }
             // unless it failed
             if let Some(Before { frame, film: Some(film), .. }) = &self.before {
@@ -187,20 +190,31 @@ impl DeviceStage<'_> {
         let most =
             if self.cold { 1 } else { self.held.as_ref().map_or(1, |held| held.device.most_under_way()) };
         while self.under_way.len() >= most {
-            self.finish_first();
+            self.finish(true);
         }
     }
 
     /// Makes a frame resident and begins to trace it.
     fn begin(&mut self, mut read: ReadFrame, bytes: u64, may_retry: bool) {
-        let shared = self.shared;
-        self.held.get_or_insert_with(|| shared.take());
-        let busy = Stopwatch::start();
-        let begun_s = self.clock.s();
+        if let Some(failure) = self.cannot_begin() {
+            return self.failed(failure, UnderWay::not_begun(read, bytes));
+        }
+        let mut begun_s = self.clock.s();
         read.report.device = Some(self.told.name.clone());
-        let begun = caught("tracing", || self.update_and_begin(&mut read));
-        self.told.busy_s += busy.s();
-        self.tell_holds();
+        let mut begun = self.try_begin(&mut read);
+        if begun.as_ref().is_err_and(Failure::is_for_want_of_room) && !self.cold && !self.in_vain {
+            // what others left there is in the way
+            while !self.under_way.is_empty() {
+                self.finish(may_retry);
+            }
+            if let Some(failure) = self.cannot_begin() {
+                return self.failed(failure, UnderWay::not_begun(read, bytes));
+            }
+            self.forget(true);
+            begun_s = self.clock.s();
+            begun = self.try_begin(&mut read);
+            self.in_vain = begun.as_ref().is_err_and(Failure::is_for_want_of_room);
+        }
         match begun {
             Ok(begun) => {
                 let (frame, fingerprint) = (Arc::clone(&read.frame), read.fingerprint);
@@ -209,7 +223,7 @@ impl DeviceStage<'_> {
                 self.under_way.push_back(UnderWay { read, bytes, begun, begun_s });
             }
             Err(failure) => {
-                let frame = UnderWay { read, bytes, begun: Begun::default(), begun_s };
+                let frame = UnderWay::not_begun(read, bytes);
                 if may_retry && failure.is_lost() {
                     let mut lost = std::mem::take(&mut self.under_way);
                     lost.push_back(frame);
@@ -220,11 +234,40 @@ impl DeviceStage<'_> {
         }
     }
 
-    /// Waits for the frame that was begun first, and hands on its film.
-    fn finish_first(&mut self) {
-        self.finish(true);
+    /// Takes the device, which others may have; why not.
+    fn cannot_begin(&mut self) -> Option<Failure> {
+        let Ends { stop, .. } = self.ends;
+        let shared = self.shared;
+        if self.losses >= LOSSES {
+            let why = format!("{LOSSES} times, one after the other; it is not tried any more");
+            return Some(Failure::Device(DeviceError::Lost { device: self.told.name.clone(), why }));
+        }
+        while self.held.is_none() && !stop.asked() {
+            self.held = shared.take_within(LOOKS_FOR_STOP);
+        }
+        self.held.is_none().then_some(Failure::Device(DeviceError::Stopped))
     }
 
+    /// Makes a frame resident and begins it; counts what was there.
+    fn try_begin(&mut self, read: &mut ReadFrame) -> Result<Begun, Failure> {
+        let counts = |stage: &Self| {
+            let residency = stage.held.as_ref().map(|held| held.device.residency());
+            residency.map_or([0; 3], |r| [r.hits, r.misses, r.evictions])
+        };
+        let (busy, before) = (Stopwatch::start(), counts(self));
+        let begun = caught("tracing", || self.update_and_begin(read));
+        self.told.busy_s += busy.s();
+        let after = counts(self);
+        let told = &mut self.told.resident;
+        // a device that was lost begins to count anew
+        for (told, i) in [&mut told.hits, &mut told.misses, &mut told.evictions].into_iter().zip(0..) {
+            *told += after[i].saturating_sub(before[i]);
+        }
+        self.tell_holds();
+        begun
+    }
+
+    /// Waits for the frame that was begun first, and hands on its film. Where the device is lost it may be tried again.
     fn finish(&mut self, may_retry: bool) {
         let Some(mut first) = self.under_way.pop_front() else { return };
         let busy = Stopwatch::start();
@@ -272,13 +315,20 @@ impl DeviceStage<'_> {
 
     fn failed(&mut self, failure: Failure, frame: UnderWay) {
         self.before = None;
-        self.forget(true);
+        if !failure.left_all_as_told() {
+            self.forget(true);
+        }
         self.let_go();
         let UnderWay { mut read, bytes, .. } = frame;
         let Ends { device, share, .. } = self.ends;
         share.give_bytes(bytes);
         let index = read.report.index;
         if matches!(failure, Failure::Device(DeviceError::Stopped)) {
+            share.gave_back(device, index);
+            return self.tell();
+        }
+        if share.is_gone(device) {
+            // it was given up for those that were lost with this one
             share.gave_back(device, index);
             return self.tell();
         }
@@ -334,8 +384,27 @@ impl DeviceStage<'_> {
     fn shown(&mut self, film: Arc<LatentFilm>, status: Status, read: ReadFrame, bytes: u64) {
         self.ends.share.give_bytes(bytes);
         self.tell();
-        // the writers outlive this stage
-        let _ = self.ends.to_writers.send(Shown { film, read, status });
+        self.shown.push_back(Shown { film, read, status });
+        self.hand_on();
+    }
+
+    /// Hands films to the writers. Where all of them are busy and other runs wait for the device, they have it meanwhile.
+    fn hand_on(&mut self) {
+        while let Some(shown) = self.shown.pop_front() {
+            match self.ends.to_writers.try_send(shown) {
+                Err(TrySendError::Full(shown))
+                    if !self.under_way.is_empty() && self.ends.share.has_others() =>
+                {
+                    self.shown.push_front(shown);
+                    self.finish(true);
+                }
+                Err(TrySendError::Full(shown)) => {
+                    // the writers outlive this stage
+                    let _ = self.ends.to_writers.send(shown);
+                }
+                Ok(()) | Err(TrySendError::Disconnected(_)) => {}
+            }
+        }
     }
 
     /// Tells of the device and of what was noticed.
@@ -368,7 +437,6 @@ impl DeviceStage<'_> {
         let residency = device.residency();
         let plan = plan_frame(&read.frame, residency, &wishes);
         let work = DeviceWork::new(&plan, &read.frame, Rays::of_shot(&read.shot));
-        let is_start = plan.is_cold || !residency.holds_trees_of(plan.run);
         let needed_bytes = plan.needed_bytes(residency);
         estimator.begins(place, &work, report);
         report.bytes.predicted = Some(estimator.resident_bytes(place, &plan, residency));
@@ -382,21 +450,27 @@ impl DeviceStage<'_> {
         let output =
             if read.encoding.takes_codes() { Output::Codes { exposure_stops } } else { Output::Linear };
         device.begin(&read.frame, &read.shot, output, self.ends.stop)?;
-        Ok(Begun { work, cost, is_start })
+        Ok(Begun { work, cost, is_start: plan.is_start })
     }
 
-    /// Tells what a frame took: from its begin, or from the end of the one before, to its own.
+    /// Tells what a frame took of its device: from its begin, or from the end of the one before, to its own, but for what it
+    /// waited for others meanwhile.
     fn tell_share(&mut self, frame: &UnderWay) {
         let ended_s = self.clock.s();
-        let seconds = ended_s - frame.begun_s.max(self.ended_s);
+        let passed_s = ended_s - frame.begun_s.max(self.ended_s);
         self.ended_s = ended_s;
         let Ends { device, share, .. } = self.ends;
-        let index = frame.read.report.index;
+        let report = &frame.read.report;
+        let [start_s, trace_s] = [
+            report.ms.upload.unwrap_or(0.0) + report.ms.update.unwrap_or(0.0),
+            report.ms.trace.unwrap_or(0.0),
+        ]
+        .map(|ms| ms / 1e3);
         if frame.begun.is_start {
-            share.started(device, seconds);
-            share.done(device, index, 0.0);
+            share.started(device, start_s);
+            share.done(device, report.index, trace_s);
         } else {
-            share.done(device, index, seconds);
+            share.done(device, report.index, passed_s.min(start_s + trace_s));
         }
     }
 
@@ -420,13 +494,5 @@ impl DeviceStage<'_> {
         }
         report.rays = traced.rays.into();
         report.ms.trace = Some(traced.trace_ms);
-    }
-}
-
-/// What a call into a device gives, be it a panic.
-fn caught<T>(what: &str, call: impl FnOnce() -> Result<T, DeviceError>) -> Result<T, Failure> {
-    match catch_unwind(AssertUnwindSafe(call)) {
-        Ok(done) => done.map_err(Failure::Device),
-        Err(panic) => Err(Failure::Panic(panic_text(what, &*panic))),
     }
 }

@@ -41,6 +41,8 @@ pub(super) struct Failed {
 pub(super) struct Job {
     pub(super) total: u64,
     pub(super) grows: bool,
+    /// Whether what is leased of it would be read.
+    pub(super) is_read: bool,
     /// Its share beside others'.
     pub(super) weight: f64,
     pub(super) estimates: Vec<Estimate>,
@@ -80,6 +82,7 @@ impl Job {
         Self {
             total: new.frames,
             grows: new.grows,
+            is_read: true,
             weight: weight(new.priority),
             estimates: new.costs.iter().map(estimate).collect(),
             open,

@@ -169,6 +169,13 @@ impl Scheduler {
         true
     }
 
+    /// Whether what is leased of a job would be read; where not, nothing is.
+    pub fn can_be_read(&mut self, job: JobId, can: bool) {
+        if let Some(one) = self.jobs.get_mut(job.0).and_then(Option::as_mut) {
+            one.is_read = can;
+        }
+    }
+
     /// A job's scene is resident on a device, or is not.
     pub fn holds(&mut self, device: usize, job: JobId, is_resident: bool) {
         let facing = &mut self.devices[device];
@@ -290,6 +297,36 @@ impl Scheduler {
         }
     }
 
+    /// Whether a device is there that may try a frame that failed.
+    pub fn has_other(&self, job: JobId, frame: u64) -> bool {
+        let Some(one) = self.jobs.get(job.0).and_then(Option::as_ref) else { return false };
+        one.failed.get(&frame).is_some_and(|failed| self.may_be_tried(one, failed))
+    }
+
+    fn may_be_tried(&self, one: &Job, failed: &Failed) -> bool {
+        failed.is_leased
+            || (0..self.devices.len()).any(|d| {
+                let Device { facts, is_present, .. } = self.devices[d];
+                let Estimate { costs, bytes, .. } = one.estimates[facts.kind];
+                is_present && !failed.on.contains(&d) && costs.fits && bytes <= facts.budget_bytes
+            })
+    }
+
+    /// Gives up those frames of a job that failed and that no device may try any more; how many.
+    pub fn give_up_hopeless(&mut self, job: JobId) -> u64 {
+        let Some(one) = self.jobs.get(job.0).and_then(Option::as_ref) else { return 0 };
+        let hopeless: Vec<u64> = one
+            .failed
+            .iter()
+            .filter(|(_, failed)| !self.may_be_tried(one, failed))
+            .map(|(&f, _)| f)
+            .collect();
+        for &frame in &hopeless {
+            self.give_up(job, frame);
+        }
+        hopeless.len() as u64
+    }
+
     /// A device is lost: what was leased to it is open again, what it held is gone.
     pub fn device_gone(&mut self, now_s: f64, device: usize) {
         if !self.devices[device].is_present {
@@ -361,7 +398,9 @@ impl Scheduler {
 
     pub(super) fn fits(&self, device: usize, job: &Job) -> bool {
         let facts = self.devices[device].facts;
-        job.estimates[facts.kind].costs.fits && job.estimates[facts.kind].bytes <= facts.budget_bytes
+        job.is_read
+            && job.estimates[facts.kind].costs.fits
+            && job.estimates[facts.kind].bytes <= facts.budget_bytes
     }
 
     fn alone_s(&self, job: &Job) -> f64 {

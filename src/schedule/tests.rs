@@ -130,6 +130,26 @@ fn what_comes_back_is_leased_again_and_what_failed_goes_elsewhere() {
 }
 
 #[test]
+fn what_failed_and_fits_nowhere_else_is_given_up() {
+    let devices = [DeviceFacts { budget_bytes: 100, kind: 0 }, DeviceFacts { budget_bytes: 10, kind: 1 }];
+    let mut scheduler = Scheduler::new(Policy::Affinity, &devices);
+    let costs = vec![Costs { warm_s: 0.1, cold_s: 0.0, fits: true }; 2];
+    let id = scheduler.add(0.0, &NewJob { costs, bytes: 5, ..job(2, 0.1, 0.0) }).unwrap();
+    let lease = scheduler.lease(0.0, 0).unwrap();
+    let frame = lease.frames.start;
+    scheduler.give_back(0.1, 0, id, lease.frames, true);
+    assert!(scheduler.has_other(id, frame) && scheduler.give_up_hopeless(id) == 0);
+    // the next frame is larger than the other device
+    assert!(scheduler.needs(0.2, id, 50));
+    assert!(!scheduler.has_other(id, frame));
+    assert_eq!(scheduler.give_up_hopeless(id), 1);
+    assert_eq!(scheduler.lease(0.3, 1), None);
+    let last = scheduler.lease(0.3, 0).unwrap();
+    trace(&mut scheduler, 0, &last, 0.1);
+    assert!(scheduler.is_done(id));
+}
+
+#[test]
 fn a_lost_device_gives_its_frames_back() {
     let mut scheduler = Scheduler::new(Policy::Affinity, &equal(2));
     let id = scheduler.add(0.0, &job(100, 0.1, 0.5)).unwrap();

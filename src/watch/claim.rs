@@ -183,7 +183,8 @@ impl Drop for Claims {
 impl Claim {
     /// Whether it still stands: a daemon that was thought dead finds its claims taken over.
     pub(super) fn stands(&self) -> bool {
-        self.0.exists()
+        // what cannot be looked at is not gone
+        !matches!(self.0.try_exists(), Ok(false))
     }
 
     /// Gives the job back.

@@ -39,7 +39,7 @@ impl Resident {
         refuse_beyond(device, needed_bytes)?;
         let mut of_frame: HashMap<_, _> =
             frame.objects.iter().flat_map(|o| o.geometry.shared_parts()).collect();
-        self.residency.begin(plan.run);
+        self.residency.begin(plan);
         let mut cost = UpdateCost::default();
         let start = Stopwatch::start();
         for step in &plan.steps {
@@ -94,7 +94,7 @@ impl Resident {
                 }
             }
         }
-        self.residency.end(&plan.again);
+        self.residency.end(plan);
         let update_ms = cost.built.ms + cost.restored.ms + cost.refitted.ms;
         cost.upload_ms = Some(start.ms() - update_ms);
         cost.update_ms = Some(update_ms);

@@ -46,6 +46,8 @@ pub struct GpuDevice {
     pool: Arc<ThreadPool>,
     /// None once it was lost, until it is opened again.
     open: Option<Open>,
+    /// Whether there was no room for something; what is cold begins with buffers of the least size then.
+    is_full: bool,
     /// What a lost one holds.
     nothing: Residency,
 }
@@ -98,8 +100,15 @@ impl GpuDevice {
             threads: pool.current_num_threads(),
             budget_bytes,
         };
-        let mut device =
-            Self { info, adapter: adapter.clone(), store, pool, open: None, nothing: Residency::default() };
+        let mut device = Self {
+            info,
+            adapter: adapter.clone(),
+            store,
+            pool,
+            open: None,
+            is_full: false,
+            nothing: Residency::default(),
+        };
         device.opened()?;
         Ok(device)
     }
@@ -138,6 +147,8 @@ impl GpuDevice {
 
     /// Forgets a device that is lost: what it held is gone.
     fn settled<T>(&mut self, done: Result<T, DeviceError>) -> Result<T, DeviceError> {
+        self.is_full |=
+            matches!(done, Err(DeviceError::MemoryFull { .. } | DeviceError::BufferTooLarge { .. }));
         if matches!(done, Err(DeviceError::Lost { .. })) {
             match self.open.take() {
                 // it is left as it is: to close it would wait for it
@@ -149,6 +160,13 @@ impl GpuDevice {
     }
 
     fn apply_here(&mut self, plan: &UpdatePlan, frame: &Frame) -> Result<UpdateCost, DeviceError> {
+        if plan.is_cold
+            && std::mem::take(&mut self.is_full)
+            && self.open.as_ref().is_some_and(|open| open.under_way.is_empty())
+        {
+            // its buffers would stay as large as they have become
+            self.open = None;
+        }
         self.opened()?;
         let Self { open: Some(open), pool, info, .. } = self else { return Ok(UpdateCost::default()) };
         // what was to be fitted stands where parts may now be overwritten

@@ -103,6 +103,9 @@ pub(super) struct Fit {
     pub(super) below_top: Vec<Range<u32>>,
 }
 
+/// What is sent is handed over in pieces of about so many bytes.
+const STAGED_BYTES: u64 = 256 << 20;
+
 /// Parts and trees.
 #[derive(Debug)]
 pub(super) struct Resident {
@@ -158,8 +161,9 @@ impl Resident {
         for object in &frame.objects {
             of_frame.extend(object.geometry.parts().into_iter().map(|(name, _)| (name, &*object.geometry)));
         }
-        self.residency.begin(plan.run);
+        self.residency.begin(plan);
         let mut cost = UpdateCost::default();
+        let mut staged_bytes = 0;
         let start = Stopwatch::start();
         for step in &plan.steps {
             match *step {
@@ -179,6 +183,12 @@ impl Resident {
                         self.parts.insert(part, place);
                     }
                     self.residency.hold(part, bytes);
+                    staged_bytes += bytes;
+                    if staged_bytes > STAGED_BYTES {
+                        // else all would wait a second time in the host's memory
+                        means.gpu.queue.submit([]);
+                        staged_bytes = 0;
+                    }
                 }
                 Step::Refit { from, tree: name, object, .. } => {
                     let Some(object) = frame.objects.get(object) else { continue };
@@ -208,7 +218,7 @@ impl Resident {
                 }
             }
         }
-        self.residency.end(&plan.again);
+        self.residency.end(plan);
         let update_ms = cost.built.ms + cost.refitted.ms;
         cost.upload_ms = Some(start.ms() - update_ms);
         cost.update_ms = Some(update_ms);

@@ -209,9 +209,7 @@ impl Daemon<'_> {
         }
         for device in &outcome.report.devices {
             if let Some(all) = self.devices.iter_mut().find(|d| d.name == device.name) {
-                all.frames += device.frames;
-                all.busy_s += device.busy_s;
-                all.resident = device.resident.clone();
+                all.add(device);
             }
         }
         self.stopped(id, Ok(outcome));
