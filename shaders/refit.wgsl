@@ -264,8 +264,16 @@ fn refit_level(
 }
 
 @compute @workgroup_size(GROUP)
-fn refit_top(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) thread: u32) {
-    let tree = trees[level.tree + group.x];
+fn refit_top(
+    @builtin(workgroup_id) group: vec3<u32>,
+    @builtin(num_workgroups) groups: vec3<u32>,
+    @builtin(local_invocation_index) thread: u32,
+) {
+    let top = group.y * groups.x + group.x;
+    if (top >= level.trees) {
+        return;
+    }
+    let tree = trees[level.tree + top];
     for (var height = tree.top_height; height < tree.height_count; height++) {
         let first = words[tree.heights + height];
         let count = words[tree.heights + height + 1u] - first;
@@ -286,7 +294,7 @@ fn refit_top(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_
         let at = 2u * tree.first_box;
         let low = boxes[at];
         let whole = half_area(Aabb(low.xyz, boxes[at + 1u].xyz));
-        costs[level.tree + group.x] = select(0.0, low.w / whole, whole > 0.0);
+        costs[level.tree + top] = select(0.0, low.w / whole, whole > 0.0);
         // before the root stands the box of all
         let before = 5u * (tree.first_node - 1u);
         nodes[before] = vec4<u32>(bitcast<vec3<u32>>(low.xyz), 0u);

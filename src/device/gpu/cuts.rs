@@ -26,6 +26,8 @@ const SAMPLES_UNKNOWN: u64 = 1 << 22;
 const BRANCHING: u64 = 8;
 /// How long a dispatch should take at most, ms.
 const DISPATCH_MS: f64 = 10.0;
+/// Samples of one dispatch in any case.
+const SAMPLES_LEAST: u64 = 1 << 16;
 /// Samples of one dispatch at most: the next frame may be a hundred times harder than the last one.
 const SAMPLES_MOST: u64 = 1 << 25;
 
@@ -41,11 +43,11 @@ impl Pace {
         self.samples_per_ms = (ms > 0.0).then(|| samples as f64 / ms);
     }
 
-    /// Samples of a dispatch of the next frame at most.
-    pub(super) fn samples_most(self, has_branches: bool) -> u64 {
-        let unknown = if has_branches { SAMPLES_UNKNOWN / BRANCHING } else { SAMPLES_UNKNOWN };
-        let known = self.samples_per_ms.map_or(0, |rate| (rate * DISPATCH_MS) as u64);
-        known.clamp(unknown, SAMPLES_MOST)
+    /// Samples of a dispatch of the next frame at most, where each sends so many rays to lights.
+    pub(super) fn samples_most(self, has_branches: bool, shadows: u64) -> u64 {
+        let unknown = SAMPLES_UNKNOWN / if has_branches { BRANCHING } else { 1 } / shadows.max(1);
+        let known = self.samples_per_ms.map(|rate| (rate * DISPATCH_MS) as u64);
+        known.unwrap_or(unknown).clamp(SAMPLES_LEAST, SAMPLES_MOST)
     }
 }
 
@@ -79,14 +81,19 @@ mod tests {
         let pace = |samples, ms| {
             let mut pace = Pace::default();
             pace.learn(samples, ms);
-            [pace.samples_most(false), pace.samples_most(true)]
+            [pace.samples_most(false, 1), pace.samples_most(true, 64)]
         };
-        assert_eq!([false, true].map(|b| Pace::default().samples_most(b)), [1 << 22, 1 << 19]);
-        // a million samples a ms, a hundred thousand, very many; a frame that took no time teaches nothing
+        assert_eq!([false, true].map(|b| Pace::default().samples_most(b, 1)), [1 << 22, 1 << 19]);
+        assert_eq!(
+            [0, 4, 1 << 40].map(|s| Pace::default().samples_most(false, s)),
+            [1 << 22, 1 << 20, 1 << 16]
+        );
+        // a million samples a ms, a hundred thousand, a hundred, very many; a frame that took no time teaches nothing
         assert_eq!(pace(3_000_000, 3.0), [10_000_000; 2]);
-        assert_eq!(pace(300_000, 3.0), [1 << 22, 1_000_000]);
+        assert_eq!(pace(300_000, 3.0), [1_000_000; 2]);
+        assert_eq!(pace(300, 3.0), [1 << 16; 2]);
         assert_eq!(pace(1 << 40, 1.0), [1 << 25; 2]);
-        assert_eq!(pace(1 << 40, 0.0), [1 << 22, 1 << 19]);
+        assert_eq!(pace(1 << 40, 0.0), [1 << 22, 1 << 16]);
     }
 
     #[test]

@@ -13,7 +13,7 @@ use super::resident::{FitOf, Heaps};
 use super::scene::Records;
 use crate::device::{DeviceError, Output, Stop};
 use crate::film::LatentFilm;
-use crate::scene::Shot;
+use crate::scene::{Light, Shot};
 use rayon::ThreadPool;
 use std::ops::Range;
 use std::sync::Arc;
@@ -109,7 +109,7 @@ impl Ground<'_> {
         let center_slices = if layout.center.is_empty() {
             Vec::new()
         } else {
-            let samples = self.buffers.pace.samples_most(records.has.branches);
+            let samples = self.buffers.pace.samples_most(records.has.branches, 1);
             cuts(shot.size, tile(1), samples / u64::from(shot.size[0]))
         };
         self.room_for_fits(fits)?;
@@ -216,7 +216,10 @@ impl Ground<'_> {
     /// How the picture is cut, and the bytes that waiting rays take in one cut.
     fn slices(&self, records: &Records, shot: &Shot, lanes: u32, waiting_each: u32) -> (Vec<Cut>, u64) {
         let [columns, rows] = tile(lanes);
-        let samples = self.buffers.pace.samples_most(records.has.branches);
+        let points =
+            |light: &Light| if let Light::Area { samples } = light { u64::from(*samples) } else { 1 };
+        let shadows = shot.lights.iter().map(points).sum();
+        let samples = self.buffers.pace.samples_most(records.has.branches, shadows);
         let mut rows_most = samples / (u64::from(shot.size[0]) * u64::from(shot.samples)).max(1);
         let threads_of_tiles = u64::from(shot.size[0].div_ceil(columns) * GROUP);
         let bytes_each = u64::from(waiting_each) * WAITING_ROWS * 16;
