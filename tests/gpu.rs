@@ -277,6 +277,18 @@ fn a_large_tree_is_fitted_height_by_height() {
 }
 
 #[test]
+fn more_trees_are_fitted_than_a_dispatch_has_workgroups_in_one_direction() {
+    let frame = scenes::very_many_trees();
+    let shot = shot_at(1.0);
+    let mut cpu = CpuDevice::new(2, BUDGET_BYTES).unwrap();
+    let right = picture(&mut cpu, &frame, &shot);
+    for adapter in usable() {
+        let film = picture(&mut open(&adapter), &frame, &shot);
+        Agreement::new(&right, &film).check(&adapter.name());
+    }
+}
+
+#[test]
 fn a_picture_beyond_the_largest_buffer_is_refused_with_the_figures() {
     for adapter in usable() {
         let (frame, shot) = (&one(scenes::sheet(13, |_| false, |_, p| p)), &shot_at(1.0));

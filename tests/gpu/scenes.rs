@@ -2,6 +2,7 @@
 
 use crate::rays::{Mesh as Shape, sphere};
 use rentix::math::{DAffine3, DVec3, Vec3};
+use rentix::plan::tree_name;
 use rentix::scene::{
     ABSENT, Aov, AovSet, Attribute, Background, Camera, Channel, Colors, Corners, Faces, Falloff, Filter,
     Frame, Geometry, Light, Map, Material, MaterialRuns, Mesh, Normals, Object, Part, Positions, Reflection,
@@ -390,4 +391,22 @@ pub(crate) fn sheet(side: u32, flipped: impl Fn(u32) -> bool, place: impl Fn(u32
         meshes: vec![Mesh { first_face: 0, face_count: faces, first_triangle: 0, triangle_count: count }],
         ..geometry(&shape, Some(matt([0.7, 0.5, 0.3])))
     }
+}
+
+/// More trees than a dispatch has workgroups in one direction: specks in a row, and eight tiles that are fitted after 65,535
+/// others, for trees are fitted in the order of their names.
+pub(crate) fn very_many_trees() -> Frame {
+    let at = |middle: Vec3, size: f32| sheet(2, |_| false, move |_, p| middle + size * p);
+    let specks: Vec<_> =
+        (0..65_600).map(|i| at(Vec3::new(i as f32 * 1e-5 - 0.5, -1.0, -0.5), 1e-4)).collect();
+    let mut names: Vec<_> = specks.iter().map(tree_name).collect();
+    names.sort_unstable();
+    let tile = |i: u32| {
+        let put = |n: u32| {
+            at(Vec3::new(0.5 * (i % 4) as f32 - 0.75, 0.5 * (i / 4) as f32 - 0.25, n as f32 * 1e-6), 0.2)
+        };
+        (0..).map(put).find(|tile| tree_name(tile) > names[65_535]).expect("one of very many")
+    };
+    let objects = specks.iter().cloned().chain((0..8).map(tile));
+    Frame { objects: objects.map(|g| Object { geometry: Arc::new(g), transform: None }).collect() }
 }
