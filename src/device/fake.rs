@@ -151,6 +151,7 @@ impl Device for FakeDevice {
             rays: RayCounts::default(),
             trace_ms: 0.0,
             update_ms: None,
+            cost_ratio: None,
             spans: Spans::default(),
         });
         Ok(())

@@ -126,6 +126,8 @@ pub struct Traced {
     pub trace_ms: f64,
     /// Fitting trees for this frame, ms, where the device does that when it traces.
     pub update_ms: Option<f64>,
+    /// The surface-area cost of the frame's trees over that of their last builds, mean by triangles, where fits showed it.
+    pub cost_ratio: Option<f64>,
     /// When it fitted trees and when it traced, by its own clock; where it has one.
     pub spans: Spans,
 }

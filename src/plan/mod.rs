@@ -184,9 +184,7 @@ pub fn plan_frame(frame: &Frame, residency: &Residency, wishes: &Wishes) -> Upda
     let used: BTreeSet<PartHash> = needed.keys().chain(trees.keys()).copied().collect();
     let is_held = |name: &PartHash| !cold && residency.held.contains_key(name);
     let is_others = |held: &Held| held.users.iter().any(|user| wishes.others.contains(&user.run));
-    let is_own = |name: &PartHash| {
-        residency.held.get(name).is_some_and(|held| held.users.iter().any(|user| user.run == wishes.run))
-    };
+    let is_own = |name: &PartHash| residency.held.get(name).is_some_and(|held| held.is_of(wishes.run));
 
     // trees that are fitted to other positions, and those in whose place another is built
     let (mut taken, mut overwritten) = (BTreeSet::new(), BTreeSet::new());

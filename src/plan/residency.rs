@@ -74,7 +74,8 @@ pub struct User {
 }
 
 impl Held {
-    fn is_of(&self, run: u64) -> bool {
+    /// Whether a run uses it.
+    pub fn is_of(&self, run: u64) -> bool {
         self.users.iter().any(|user| user.run == run)
     }
 
@@ -194,11 +195,15 @@ impl Residency {
     /// The surface-area cost of the trees that this turn's frame uses over that of their last builds, mean by triangles;
     /// None without trees.
     pub fn cost_ratio(&self) -> Option<f64> {
-        let is_used = |name: &PartHash| self.held.get(name).is_some_and(|held| held.last_used == self.turn);
-        let used = || self.trees.iter().filter(|(name, _)| is_used(name)).map(|(_, state)| state);
+        let used = || self.trees.iter().filter(|(name, _)| self.is_used(name)).map(|(_, state)| state);
         let triangles: u64 = used().map(|s| s.triangles).sum();
         let sum: f64 = used().map(|s| s.triangles as f64 * s.ratio()).sum();
         (triangles > 0).then(|| sum / triangles as f64)
+    }
+
+    /// Whether this turn's frame uses it.
+    pub fn is_used(&self, name: &PartHash) -> bool {
+        self.held.get(name).is_some_and(|held| held.last_used == self.turn)
     }
 
     /// Whether a run would find a tree of its own.

@@ -322,6 +322,7 @@ mod tests {
             rays: RayCounts::default(),
             trace_ms: 1.0,
             update_ms: None,
+            cost_ratio: None,
             spans: Spans::default(),
         };
         let build_s = || estimator.device_s(0, &work)[0].value;

@@ -19,6 +19,7 @@ mod report;
 mod share;
 mod source;
 mod trace;
+mod under_way;
 pub mod verify;
 mod write;
 

@@ -8,14 +8,14 @@ use super::fleet::{Held, Shared};
 use super::read::{Read, ReadFrame};
 use super::report::DeviceReport;
 use super::share::Share;
+use super::under_way::{Before, Begun, UnderWay};
 use super::{Note, RunOptions, Shown};
 use crate::clock::Stopwatch;
-use crate::device::{DeviceError, Output, Stop, Traced, UpdateCost};
+use crate::device::{DeviceError, Output, Stop, Traced};
 use crate::diff::changes;
 use crate::film::LatentFilm;
 use crate::kernel::media::MEDIA_MAX;
 use crate::plan::{Action, Update, Wishes, plan_frame};
-use crate::scene::{Frame, PartHash};
 use crate::warning::Warnings;
 use parking_lot::FairMutexGuard;
 use std::collections::{BTreeMap, VecDeque};
@@ -133,38 +133,6 @@ struct DeviceStage<'a> {
     ends: Ends<'a>,
 }
 
-/// A frame that was begun.
-struct UnderWay {
-    read: ReadFrame,
-    /// Bytes of the host's memory, until it has left this stage.
-    bytes: u64,
-    begun: Begun,
-    /// When that was, s.
-    begun_s: f64,
-}
-
-/// What the device did for a frame before it could be traced.
-#[derive(Clone, Debug, Default)]
-struct Begun {
-    work: DeviceWork,
-    cost: UpdateCost,
-    /// Whether no tree of it or of its run was there.
-    is_start: bool,
-}
-
-impl UnderWay {
-    fn not_begun(read: ReadFrame, bytes: u64) -> Self {
-        Self { read, bytes, begun: Begun::default(), begun_s: 0.0 }
-    }
-}
-
-/// A frame, and what came of it: None while it is under way.
-struct Before {
-    frame: Arc<Frame>,
-    fingerprint: PartHash,
-    film: Option<Arc<LatentFilm>>,
-}
-
 impl DeviceStage<'_> {
     /// Begins a frame; before that finishes others, where the device takes no more.
     fn take(&mut self, mut read: ReadFrame, bytes: u64) {
@@ -220,6 +188,7 @@ impl DeviceStage<'_> {
                 let (frame, fingerprint) = (Arc::clone(&read.frame), read.fingerprint);
                 self.before = Some(Before { frame, fingerprint, film: None });
                 self.forget(false);
+                self.in_vain = false;
                 self.under_way.push_back(UnderWay { read, bytes, begun, begun_s });
             }
             Err(failure) => {
@@ -483,6 +452,10 @@ impl DeviceStage<'_> {
             if cost.built.triangles == 0 {
                 cost.refitted.ms = ms;
             }
+        }
+        if traced.cost_ratio.is_some() {
+            cost.cost_ratio = traced.cost_ratio;
+            report.update.cost_ratio = traced.cost_ratio.filter(|ratio| ratio.is_finite());
         }
         self.learned.frame(cost, traced.trace_ms);
         self.ends.estimator.traced(self.ends.device, work, cost, traced);

@@ -38,7 +38,8 @@ pub(super) fn trace(
             Some(sum)
         })
         .ok_or(DeviceError::Stopped)?;
-    Ok(Traced { film: film.into(), rays, trace_ms: start.ms(), update_ms: None, spans: Spans::default() })
+    let (film, trace_ms) = (film.into(), start.ms());
+    Ok(Traced { film, rays, trace_ms, update_ms: None, cost_ratio: None, spans: Spans::default() })
 }
 
 /// Tile after tile; None where it was stopped.

@@ -29,7 +29,7 @@ use fits::Fits;
 use frame::{Begun, Buffers, Ground, SLOTS};
 use pipelines::Pipelines;
 use rayon::{ThreadPool, ThreadPoolBuilder};
-use resident::{Means, Resident};
+use resident::{Costs, Means, Resident};
 use scene::Records;
 use std::collections::{HashMap, VecDeque};
 use std::ops::Range;
@@ -62,8 +62,8 @@ struct Open {
     background: Option<(PartHash, Range<u32>)>,
     /// The boxes of positions that were asked for in this frame or the one before.
     boxes: HashMap<PartHash, Aabb>,
-    /// Frames under way, the first begun first, and when that was.
-    under_way: VecDeque<(Begun, Stopwatch)>,
+    /// Frames under way, the first begun first; the costs of those trees that are not fitted for it, and when that was.
+    under_way: VecDeque<(Begun, Costs, Stopwatch)>,
 }
 
 impl GpuDevice {
@@ -217,7 +217,9 @@ impl GpuDevice {
             // nothing was handed over
             open.resident.fits = waiting;
         }
-        open.under_way.push_back((begun?, start));
+        let begun = begun?;
+        let costs = open.resident.kept_costs(&begun.fits);
+        open.under_way.push_back((begun, costs, start));
         Ok(())
     }
 
@@ -227,12 +229,10 @@ impl GpuDevice {
             why: "what was under way is gone".to_string(),
         };
         let Some(open) = &mut self.open else { return Err(lost()) };
-        let Some((begun, start)) = open.under_way.pop_front() else { return Err(lost()) };
+        let Some((begun, mut costs, start)) = open.under_way.pop_front() else { return Err(lost()) };
         let (fits, samples) = (begun.fits.clone(), begun.samples());
         let (film, facts) = open.ground().finish(begun, &self.pool)?;
-        for (of, cost) in fits.iter().zip(&facts.costs) {
-            open.resident.fitted(*of, *cost);
-        }
+        open.resident.fitted(&fits, &facts.costs, &mut costs);
         let span = |first: usize| {
             let [from, to] = [facts.instants[first], facts.instants[first + 1]];
             let ms = |ticks: u64| ticks as f64 * f64::from(open.gpu.queue.get_timestamp_period()) * 1e-6;
@@ -242,7 +242,8 @@ impl GpuDevice {
         let length = |[from, to]: [f64; 2]| to - from;
         let trace_ms = spans.trace.map_or_else(|| start.ms(), length);
         open.buffers.pace.learn(samples, trace_ms);
-        Ok(Traced { film, rays: facts.rays, trace_ms, update_ms: spans.update.map(length), spans })
+        let (update_ms, cost_ratio) = (spans.update.map(length), costs.mean());
+        Ok(Traced { film, rays: facts.rays, trace_ms, update_ms, cost_ratio, spans })
     }
 }
 

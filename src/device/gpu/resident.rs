@@ -92,6 +92,26 @@ pub(super) struct FitOf {
     is_new: bool,
 }
 
+/// Surface-area costs of a frame's trees over those of their last builds.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Costs {
+    triangles: f64,
+    /// The sum of what each has, times its triangles.
+    sum: f64,
+}
+
+impl Costs {
+    fn add(&mut self, state: &TreeState) {
+        self.triangles += state.triangles as f64;
+        self.sum += state.triangles as f64 * state.ratio();
+    }
+
+    /// The mean by triangles; None without trees.
+    pub(super) fn mean(self) -> Option<f64> {
+        (self.triangles > 0.0).then(|| self.sum / self.triangles)
+    }
+}
+
 /// A tree that is to be fitted before the next frame is traced.
 #[derive(Clone, Debug)]
 pub(super) struct Fit {
@@ -378,13 +398,32 @@ impl Resident {
         self.fits.push(Fit { of: FitOf { mark: tree.mark, is_new }, record, nodes: last, below_top });
     }
 
-    /// Learns what a fit made of a tree's surface-area cost.
-    pub(super) fn fitted(&mut self, of: FitOf, cost: f32) {
-        let name = self.trees.iter().find(|(_, tree)| tree.mark == of.mark).map(|(name, _)| *name);
-        let Some(state) = name.and_then(|name| self.residency.trees.get_mut(&name)) else { return };
-        state.cost = f64::from(cost);
-        if of.is_new {
-            state.built_cost = state.cost;
+    /// The costs of those trees of this turn's frame that are not fitted for it.
+    pub(super) fn kept_costs(&self, fits: &[FitOf]) -> Costs {
+        let fitted: HashSet<u64> = fits.iter().map(|of| of.mark).collect();
+        let kept = self
+            .trees
+            .iter()
+            .filter(|(name, tree)| !fitted.contains(&tree.mark) && self.residency.is_used(name));
+        let mut costs = Costs::default();
+        for state in kept.filter_map(|(name, _)| self.residency.trees.get(name)) {
+            costs.add(state);
+        }
+        costs
+    }
+
+    /// Learns what fits made of trees' surface-area costs, and adds them to those of their frame.
+    pub(super) fn fitted(&mut self, fits: &[FitOf], costs: &[f32], of_frame: &mut Costs) {
+        let fitted: HashMap<u64, (bool, f32)> =
+            fits.iter().zip(costs).map(|(of, &cost)| (of.mark, (of.is_new, cost))).collect();
+        for (name, tree) in &self.trees {
+            let Some(&(is_new, cost)) = fitted.get(&tree.mark) else { continue };
+            let Some(state) = self.residency.trees.get_mut(name) else { continue };
+            state.cost = f64::from(cost);
+            if is_new {
+                state.built_cost = state.cost;
+            }
+            of_frame.add(state);
         }
     }
 
