@@ -156,6 +156,12 @@ impl UpdatePlan {
         self.steps.iter().any(|s| matches!(s, Step::Keep { .. } | Step::Refit { .. }))
     }
 
+    /// How many trees are built, and how many refitted.
+    pub fn trees(&self) -> [usize; 2] {
+        let count = |of: fn(&Step) -> bool| self.steps.iter().filter(|s| of(s)).count();
+        [count(|s| matches!(s, Step::Build { .. })), count(|s| matches!(s, Step::Refit { .. }))]
+    }
+
     /// Bytes that the frame itself needs, trees that are to be built estimated.
     pub fn needed_bytes(&self, residency: &Residency) -> u64 {
         needed_bytes(&self.steps, residency)

@@ -77,7 +77,10 @@ impl Device for CpuDevice {
     }
 
     fn apply(&mut self, plan: &UpdatePlan, frame: &Frame) -> Result<UpdateCost, DeviceError> {
-        self.resident.apply(plan, frame, &self.pool, &self.info)
+        let Self { resident, pool, info, .. } = self;
+        let mut apply = || resident.apply(plan, frame, pool, info);
+        // a change of threads for each takes as long as building a small one
+        if plan.trees().iter().sum::<usize>() > 1 { pool.install(apply) } else { apply() }
     }
 
     fn begin(&mut self, frame: &Frame, shot: &Shot, output: Output, stop: &Stop) -> Result<(), DeviceError> {

@@ -172,7 +172,10 @@ impl GpuDevice {
         // what was to be fitted stands where parts may now be overwritten
         open.fit_now()?;
         let means = Means { gpu: &open.gpu, pool, info };
-        let cost = open.resident.apply(plan, frame, &means)?;
+        let resident = &mut open.resident;
+        let mut apply = || resident.apply(plan, frame, &means);
+        // a change of threads for each takes as long as building a small one
+        let cost = if plan.trees()[0] > 1 { pool.install(apply) } else { apply() }?;
         open.gpu.check()?;
         Ok(cost)
     }
