@@ -249,8 +249,8 @@ impl<'a> Share<'a> {
 
     /// The names of the others.
     pub(super) fn others(&self) -> BTreeSet<u64> {
-        let runs = self.hub.lock().runs.keys().map(|job| job.0 as u64).collect::<BTreeSet<_>>();
-        runs.into_iter().filter(|&run| run != self.run()).collect()
+        let state = self.hub.lock();
+        state.runs.keys().filter(|&&job| job != self.job).map(|job| job.0 as u64).collect()
     }
 
     /// A device holds these bytes of the run, and the scenes of those runs that are told.

@@ -398,8 +398,11 @@ impl Resident {
         self.fits.push(Fit { of: FitOf { mark: tree.mark, is_new }, record, nodes: last, below_top });
     }
 
-    /// The costs of those trees of this turn's frame that are not fitted for it.
+    /// The costs of those trees of this turn's frame that are not fitted for it; none where no tree is.
     pub(super) fn kept_costs(&self, fits: &[FitOf]) -> Costs {
+        if fits.is_empty() {
+            return Costs::default();
+        }
         let fitted: HashSet<u64> = fits.iter().map(|of| of.mark).collect();
         let kept = self
             .trees
@@ -414,6 +417,9 @@ impl Resident {
 
     /// Learns what fits made of trees' surface-area costs, and adds them to those of their frame.
     pub(super) fn fitted(&mut self, fits: &[FitOf], costs: &[f32], of_frame: &mut Costs) {
+        if fits.is_empty() {
+            return;
+        }
         let fitted: HashMap<u64, (bool, f32)> =
             fits.iter().zip(costs).map(|(of, &cost)| (of.mark, (of.is_new, cost))).collect();
         for (name, tree) in &self.trees {
