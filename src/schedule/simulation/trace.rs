@@ -185,11 +185,7 @@ impl Family {
                 let Trace { mut jobs, .. } = Self::Giant.trace(seed);
                 jobs.swap(0, 10);
                 let pause_s = jobs[0].frames as f64 * jobs[0].warm_s / 4.0 / 20.0;
-                let mut at_s = 0.0;
-                for job in &mut jobs {
-                    job.arrives_s = at_s;
-                    at_s += random.exponential(pause_s);
-                }
+                one_by_one(&mut random, &mut jobs, pause_s);
                 let devices = vec![TraceDevice { budget_bytes: jobs[0].bytes, ..device(1.0) }; 4];
                 Trace { jobs, devices }
             }
@@ -251,12 +247,17 @@ fn jobs(random: &mut Random, count: usize, [least, most]: [f64; 2]) -> Vec<Trace
 fn arriving(random: &mut Random) -> Vec<TraceJob> {
     let mut jobs = mixed(random, 60);
     let pause_s = work_s(&jobs) / 60.0 / 4.0 / 0.7;
+    one_by_one(random, &mut jobs, pause_s);
+    jobs
+}
+
+/// Lets jobs come with so long between them on average.
+fn one_by_one(random: &mut Random, jobs: &mut [TraceJob], pause_s: f64) {
     let mut at_s = 0.0;
-    for job in &mut jobs {
+    for job in jobs {
         job.arrives_s = at_s;
         at_s += random.exponential(pause_s);
     }
-    jobs
 }
 
 /// Seconds that a device of speed 1 would take for all of it.
