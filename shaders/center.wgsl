@@ -16,7 +16,7 @@ fn center(
 ) {
     thread_in_group = local;
     let pixel = vec2<u32>(
-        8u * group.x + even_bits(local),
+        8u * (slice.first_tile + group.x) + even_bits(local),
         slice.first_row + 8u * group.y + even_bits(local >> 1u),
     );
     if (pixel.x < shot.size.x && pixel.y < min(shot.size.y, slice.end_row)) {

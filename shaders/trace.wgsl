@@ -96,7 +96,8 @@ fn trace(
     }
     let lanes = slice.lanes;
     let number = local / lanes;
-    let corner = vec2<u32>(group.x * tile_columns(lanes), slice.first_row + group.y * tile_rows(lanes));
+    let tile = slice.first_tile + group.x;
+    let corner = vec2<u32>(tile * tile_columns(lanes), slice.first_row + group.y * tile_rows(lanes));
     let place = place_in_tile(number, lanes);
     let pixel = corner + place;
     let is_inside = pixel.x < shot.size.x && pixel.y < min(shot.size.y, slice.end_row);
@@ -134,7 +135,7 @@ fn trace(
     let columns = tile_columns(lanes);
     let words = select(FILM_WORDS * columns, CODE_WORDS * columns / CODES, FILM_WORDS == 1u);
     let row_words = select(FILM_WORDS * shot.size.x, code_row_words(), FILM_WORDS == 1u);
-    let first = words * group.x;
+    let first = words * tile;
     for (var word = local; word < words * tile_rows(lanes); word += GROUP) {
         let row = corner.y + word / words;
         let in_row = word % words;

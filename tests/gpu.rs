@@ -266,6 +266,23 @@ fn a_picture_beyond_the_largest_buffer_is_refused_with_the_figures() {
     }
 }
 
+/// At a great depth there is no room for the waiting rays of a whole row of tiles.
+#[test]
+fn a_deep_picture_is_traced_in_parts_of_rows() {
+    for adapter in usable() {
+        let scene = scenes::models();
+        let mut gpu = open(&adapter);
+        for samples in [1, 16] {
+            // no ray of it has a weight left after so many
+            let [shallow, deep] = [250, 4_000].map(|depth| {
+                let shot = Shot { size: [321, 16], depth, samples, ..scene.shot.clone() };
+                bytes(&picture(&mut gpu, &scene.frame, &shot))
+            });
+            assert!(shallow == deep, "{}, {samples} samples", adapter.name());
+        }
+    }
+}
+
 #[test]
 fn a_lost_gpu_says_so_once_and_begins_anew() {
     for adapter in usable() {

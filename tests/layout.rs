@@ -72,7 +72,7 @@ fn records_of_trace() -> Vec<Layout> {
             code_steps,
             pad,
         }),
-        layout!(records::Slice { first_row, end_row, lanes, waiting_each }),
+        layout!(records::Slice { first_row, end_row, first_tile, lanes, waiting_each }),
         layout!(light::LightRecord {
             place,
             kind,

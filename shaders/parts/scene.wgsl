@@ -57,6 +57,8 @@ struct Slice {
     // The first row of pixels, and the first one that is not traced any more.
     first_row: u32,
     end_row: u32,
+    // The first tile of each row of tiles.
+    first_tile: u32,
     // The lanes that take a pixel's samples side by side: a power of two, 16 at most.
     lanes: u32,
     // Rays that may wait for each thread.

@@ -116,7 +116,7 @@ fn matt(kd: [f32; 3]) -> Material {
 }
 
 /// All illumination models: balls, and panes before and beside them.
-fn models() -> Scene {
+pub(crate) fn models() -> Scene {
     let mut objects = vec![
         object(floor(Material { illum: 10, ..matt([0.6, 0.55, 0.5]) })),
         object(wall(Material { textures: with_kd(map(checks(64))), ..matt([0.9; 3]) })),

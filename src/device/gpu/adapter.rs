@@ -206,7 +206,11 @@ impl Adapter {
             memory_hints: wgpu::MemoryHints::Performance,
             ..wgpu::DeviceDescriptor::default()
         });
-        let (device, queue) = pollster::block_on(request).map_err(|e| lost(e.to_string()))?;
+        let hangs = || {
+            lost(format!("its driver hangs: it was not open after {PATIENCE:?}; name another by --device"))
+        };
+        let opened = within(PATIENCE, || pollster::block_on(request)).ok_or_else(hangs)?;
+        let (device, queue) = opened.map_err(|e| lost(e.to_string()))?;
         let trouble = Arc::new(Mutex::new(None));
         let note = Arc::clone(&trouble);
         device.set_device_lost_callback(move |reason, why| tell(&note, format!("{reason:?}: {why}")));
@@ -225,6 +229,13 @@ impl Adapter {
             hangs: AtomicBool::new(false),
         })
     }
+}
+
+/// What comes of something, where it comes in time; else a thread is left that waits for it.
+fn within<T: Send + 'static>(patience: Duration, does: impl FnOnce() -> T + Send + 'static) -> Option<T> {
+    let (give, take) = std::sync::mpsc::channel();
+    std::thread::Builder::new().spawn(move || give.send(does())).ok()?;
+    take.recv_timeout(patience).ok()
 }
 
 /// Keeps the first trouble: what follows follows from it.
@@ -329,5 +340,18 @@ impl Gpu {
     pub(super) fn too_large(&self, what: &str, needed_bytes: u64, most_bytes: u64) -> DeviceError {
         let (device, what) = (self.name.clone(), what.to_string());
         DeviceError::BufferTooLarge { device, what, needed_bytes, most_bytes }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_hangs_is_left() {
+        assert_eq!(within(PATIENCE, || 3), Some(3));
+        let (end, never) = std::sync::mpsc::channel::<u32>();
+        assert_eq!(within(Duration::from_millis(1), move || never.recv().unwrap_or(0)), None);
+        drop(end);
     }
 }

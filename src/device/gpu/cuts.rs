@@ -1,5 +1,5 @@
-//! A picture is traced in cuts of whole rows: so small that no driver takes a dispatch for a hang, that a run can be stopped,
-//! and that rays that wait have room.
+//! A picture is traced in cuts of tiles: so small that no driver takes a dispatch for a hang, that a run can be stopped, and
+//! that rays that wait have room.
 
 use std::ops::Range;
 
@@ -12,10 +12,14 @@ pub(super) const LANES_MOST: u32 = 16;
 /// Pixels whose codes are packed into whole words.
 pub(super) const CODES: u32 = 4;
 
-/// Rows of the picture that one dispatch traces.
+/// What one dispatch traces: whole rows of tiles, or a part of one.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct Cut {
+    /// Rows of the picture.
     pub(super) rows: Range<u32>,
+    /// The first tile of each row of tiles.
+    pub(super) first_tile: u32,
+    /// Tiles, a workgroup each.
     pub(super) groups: [u32; 2],
 }
 
@@ -59,17 +63,22 @@ pub(super) fn tile(lanes: u32) -> [u32; 2] {
     [columns, pixels / columns]
 }
 
-/// Cuts a picture into so many rows at most, whole tiles each; one row of tiles at least.
-pub(super) fn cuts(size: [u32; 2], [columns, rows]: [u32; 2], rows_most: u64) -> Vec<Cut> {
-    let [width, height] = size;
-    let step = (rows_most.min(u64::from(height)) as u32 / rows).max(1) * rows;
-    // nothing is left over for a last cut of a few rows
-    let step = if step >= height { height.next_multiple_of(rows) } else { step };
-    let cut = |first: u32| {
-        let end = height.min(first.saturating_add(step));
-        Cut { rows: first..end, groups: [width.div_ceil(columns), (end - first).div_ceil(rows)] }
+/// Cuts a picture into so many tiles at most, whole rows of them where there is one, one tile at least; into so many of those
+/// rows at most.
+pub(super) fn cuts(size: [u32; 2], [columns, rows]: [u32; 2], tiles_most: u64, groups_most: u32) -> Vec<Cut> {
+    let [across, down] = [size[0].div_ceil(columns), size[1].div_ceil(rows)];
+    let high = (tiles_most / u64::from(across)).min(u64::from(down.min(groups_most))) as u32;
+    let (wide, high) = match high {
+        0 => (tiles_most.max(1) as u32, 1),
+        high => (across, high),
     };
-    (0..height).step_by(step as usize).map(cut).collect()
+    let cut = |top: u32, left: u32| {
+        let groups = [wide.min(across - left), high.min(down - top)];
+        let end = size[1].min((top + groups[1]) * rows);
+        Cut { rows: top * rows..end, first_tile: left, groups }
+    };
+    let of_row = |top| (0..across).step_by(wide as usize).map(move |left| cut(top, left));
+    (0..down).step_by(high as usize).flat_map(of_row).collect()
 }
 
 #[cfg(test)]
@@ -97,20 +106,33 @@ mod tests {
     }
 
     #[test]
-    fn cuts_cover_all_rows_once() {
+    fn cuts_cover_all_tiles_once() {
         for lanes in [1, 2, 4, 8, 16] {
             let tile = tile(lanes);
             assert_eq!(tile[0] * tile[1] * lanes, GROUP);
-            for (size, rows_most) in [([75, 43], 1), ([75, 43], 20), ([1, 1], 0), ([1280, 720], 1 << 40)] {
-                let mut next = 0;
-                for cut in cuts(size, tile, rows_most) {
-                    assert_eq!(cut.rows.start, next);
-                    assert!(cut.groups[0] * tile[0] >= size[0]);
-                    assert!(cut.groups[1] * tile[1] >= cut.rows.end - cut.rows.start);
-                    assert!((cut.rows.end - cut.rows.start) as u64 <= rows_most.max(u64::from(tile[1])));
-                    next = cut.rows.end;
+            for (size, tiles_most, groups_most) in [
+                ([75_u32, 43_u32], 1, 100),
+                ([75, 43], 3, 2),
+                ([75, 43], 47, 100),
+                ([75, 43], 47, 3),
+                ([1, 1], 0, 100),
+                ([1280, 720], 1 << 40, 1 << 16),
+            ] {
+                let [across, down] = [size[0].div_ceil(tile[0]), size[1].div_ceil(tile[1])];
+                let mut traced = vec![0; (across * down) as usize];
+                for cut in cuts(size, tile, tiles_most, groups_most) {
+                    let [wide, high] = cut.groups;
+                    assert!(u64::from(wide * high) <= tiles_most.max(1));
+                    assert!(high <= groups_most);
+                    assert_eq!(cut.rows.start % tile[1], 0);
+                    assert_eq!((cut.rows.end - cut.rows.start).div_ceil(tile[1]), high);
+                    assert!(cut.rows.end <= size[1]);
+                    for y in 0..high {
+                        let first = (cut.rows.start / tile[1] + y) * across + cut.first_tile;
+                        traced[first as usize..(first + wide) as usize].iter_mut().for_each(|n| *n += 1);
+                    }
                 }
-                assert_eq!(next, size[1]);
+                assert!(traced.iter().all(|&n| n == 1), "{size:?} in {tiles_most} tiles: {traced:?}");
             }
         }
     }

@@ -110,7 +110,7 @@ impl Ground<'_> {
             Vec::new()
         } else {
             let samples = self.buffers.pace.samples_most(records.has.branches, 1);
-            cuts(shot.size, tile(1), samples / u64::from(shot.size[0]))
+            cuts(shot.size, tile(1), samples / u64::from(GROUP), self.gpu.groups_most)
         };
         self.room_for_fits(fits)?;
         let buffers = self.room_for_frame(&layout, waiting_bytes)?;
@@ -215,22 +215,21 @@ impl Ground<'_> {
 
     /// How the picture is cut, and the bytes that waiting rays take in one cut.
     fn slices(&self, records: &Records, shot: &Shot, lanes: u32, waiting_each: u32) -> (Vec<Cut>, u64) {
-        let [columns, rows] = tile(lanes);
+        let tile = tile(lanes);
         let points =
             |light: &Light| if let Light::Area { samples } = light { u64::from(*samples) } else { 1 };
         let shadows = shot.lights.iter().map(points).sum();
         let samples = self.buffers.pace.samples_most(records.has.branches, shadows);
-        let mut rows_most = samples / (u64::from(shot.size[0]) * u64::from(shot.samples)).max(1);
-        let threads_of_tiles = u64::from(shot.size[0].div_ceil(columns) * GROUP);
-        let bytes_each = u64::from(waiting_each) * WAITING_ROWS * 16;
-        if bytes_each > 0 {
-            let most = self.gpu.binding_bytes.min(WAITING_BYTES);
-            rows_most = rows_most.min(most / (threads_of_tiles * bytes_each) * u64::from(rows));
+        // a row of them at least: fewer would leave most of a GPU idle
+        let across = u64::from(shot.size[0].div_ceil(tile[0]));
+        let mut tiles_most = across.max(samples / (u64::from(tile[0] * tile[1]) * u64::from(shot.samples)));
+        let bytes_each = u64::from(GROUP) * u64::from(waiting_each) * WAITING_ROWS * 16;
+        if let Some(most) = self.gpu.binding_bytes.min(WAITING_BYTES).checked_div(bytes_each) {
+            tiles_most = tiles_most.min(most);
         }
-        rows_most = rows_most.min(u64::from(self.gpu.groups_most) * u64::from(rows));
-        let cuts = cuts(shot.size, [columns, rows], rows_most);
-        let groups = cuts.first().map_or(0, |c| u64::from(c.groups[0]) * u64::from(c.groups[1]));
-        (cuts, groups * u64::from(GROUP) * bytes_each)
+        let cuts = cuts(shot.size, tile, tiles_most, self.gpu.groups_most);
+        let tiles = cuts.first().map_or(0, |c| u64::from(c.groups[0]) * u64::from(c.groups[1]));
+        (cuts, tiles * bytes_each)
     }
 
     fn room_for_fits(&mut self, fits: &Fits) -> Result<(), DeviceError> {
@@ -284,7 +283,13 @@ impl Ground<'_> {
         waiting_each: u32,
     ) -> Result<Sections, DeviceError> {
         let slice = |lanes: u32| {
-            move |cut: &Cut| Slice { first_row: cut.rows.start, end_row: cut.rows.end, lanes, waiting_each }
+            move |cut: &Cut| Slice {
+                first_row: cut.rows.start,
+                end_row: cut.rows.end,
+                first_tile: cut.first_tile,
+                lanes,
+                waiting_each,
+            }
         };
         let arena = &mut self.buffers.arena;
         arena.clear();

@@ -53,6 +53,7 @@ pub struct ShotConstants {
 pub struct Slice {
     pub first_row: u32,
     pub end_row: u32,
+    pub first_tile: u32,
     pub lanes: u32,
     pub waiting_each: u32,
 }
