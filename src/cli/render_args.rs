@@ -180,8 +180,8 @@ pub(super) struct RenderArgs {
     /// What frames on their way may take of the host's memory, as 512M or 4G [default: half of the free memory]
     #[arg(long, value_name = "SIZE", value_parser = size::bytes, help_heading = "Machine")]
     pub memory: Option<u64>,
-    /// What the device may hold of scenes, as 512M or 4G; pictures on their way, rays that wait (512M as a rule) and what its
-    /// buffers have grown by come on top [default: half of the free memory]
+    /// What the device may hold of scenes, as 512M or 4G; pictures on their way and rays that wait (a quarter of
+    /// it, 512M at most) come on top [default: half of the free memory; four fifths of a GPU's]
     #[arg(long, value_name = "SIZE", value_parser = size::bytes, help_heading = "Machine")]
     pub device_memory: Option<u64>,
     /// Trees over meshes that changed: auto, refit or rebuild [default: auto]

@@ -193,8 +193,8 @@ impl Adapter {
         if fits { TOP_THREADS } else { GROUP_THREADS }
     }
 
-    /// Opens it.
-    pub(super) fn open(&self) -> Result<Gpu, DeviceError> {
+    /// Opens it; it may hold so many bytes of scenes.
+    pub(super) fn open(&self, budget_bytes: u64) -> Result<Gpu, DeviceError> {
         let lost = |why: String| DeviceError::Lost { device: self.name(), why };
         if let Some(lacks) = self.lacks() {
             return Err(lost(lacks));
@@ -219,6 +219,7 @@ impl Adapter {
         Ok(Gpu {
             name: self.name(),
             binding_bytes: self.binding_bytes(),
+            budget_bytes,
             groups_most: self.handle.limits().max_compute_workgroups_per_dimension,
             features: self.used_features(),
             top_threads: self.top_threads(),
@@ -251,6 +252,8 @@ pub(super) struct Gpu {
     pub(super) queue: wgpu::Queue,
     /// Bytes of a storage buffer at most.
     pub(super) binding_bytes: u64,
+    /// Bytes of scenes that it may hold.
+    pub(super) budget_bytes: u64,
     /// Workgroups in one direction at most.
     pub(super) groups_most: u32,
     pub(super) features: wgpu::Features,

@@ -7,9 +7,10 @@ use super::cuts::{Cut, GROUP, LANES_MOST, Pace, cuts, tile};
 use super::exposed::{Exposed, FilmBuffers, Free};
 use super::film::{COUNTERS, Facts, INSTANTS, Layout, facts, take_out};
 use super::fits::{Fits, groups, is_top};
+use super::heap::Heaps;
 use super::pipelines::{Kernel, Pipelines};
 use super::records::{Slice, WAITING_ROWS};
-use super::resident::{FitOf, Heaps};
+use super::resident::FitOf;
 use super::scene::Records;
 use crate::device::{DeviceError, Output, Stop};
 use crate::film::LatentFilm;
@@ -20,7 +21,7 @@ use std::sync::Arc;
 
 /// Frames under way at most: one is read back, one traced, one prepared.
 pub(super) const SLOTS: usize = 3;
-/// Bytes of waiting rays at most.
+/// Bytes of waiting rays at most, and no more than a quarter of what scenes may take.
 const WAITING_BYTES: u64 = 1 << 29;
 
 /// Buffers that frames use one after the other, and those of each frame under way.
@@ -224,7 +225,8 @@ impl Ground<'_> {
         let across = u64::from(shot.size[0].div_ceil(tile[0]));
         let mut tiles_most = across.max(samples / (u64::from(tile[0] * tile[1]) * u64::from(shot.samples)));
         let bytes_each = u64::from(GROUP) * u64::from(waiting_each) * WAITING_ROWS * 16;
-        if let Some(most) = self.gpu.binding_bytes.min(WAITING_BYTES).checked_div(bytes_each) {
+        let waiting_most = WAITING_BYTES.min(self.gpu.binding_bytes).min(self.gpu.budget_bytes / 4);
+        if let Some(most) = waiting_most.checked_div(bytes_each) {
             tiles_most = tiles_most.min(most);
         }
         let cuts = cuts(shot.size, tile, tiles_most, self.gpu.groups_most);

@@ -1,7 +1,9 @@
-//! One large buffer in which parts have places: they come and go, and the buffer grows.
+//! Large buffers in which parts have places: they come and go, and the buffers grow.
 
 use super::adapter::Gpu;
+use crate::accel::{NODE_BYTES, TRIANGLE_BYTES};
 use crate::device::DeviceError;
+use crate::math::LINEAR_FROM_SRGB8;
 use std::collections::BTreeMap;
 use std::ops::Range;
 
@@ -36,14 +38,19 @@ impl Heap {
     }
 
     /// Takes a place of so many units, which begins at a multiple of four units: the first that is large enough, else the
-    /// buffer grows.
-    pub(super) fn take(&mut self, gpu: &Gpu, units: u64) -> Result<Range<u32>, DeviceError> {
+    /// buffer grows, beyond what is needed by no more than there are bytes to spare.
+    pub(super) fn take(
+        &mut self,
+        gpu: &Gpu,
+        units: u64,
+        spare_bytes: u64,
+    ) -> Result<Range<u32>, DeviceError> {
         // all places have multiples of four, so that all begin at one
         let units = units.next_multiple_of(4);
         let fits = |(_, length): &(&u32, &u32)| u64::from(**length) >= units;
         let start = match self.free.iter().find(fits) {
             Some((&start, _)) => start,
-            None => self.grow(gpu, units)?,
+            None => self.grow(gpu, units, spare_bytes)?,
         };
         let length = self.free.remove(&start).unwrap_or(0);
         let end = start + units as u32;
@@ -72,7 +79,7 @@ impl Heap {
     }
 
     /// Makes the buffer larger; gives where so many units are free at its end.
-    fn grow(&mut self, gpu: &Gpu, units: u64) -> Result<u32, DeviceError> {
+    fn grow(&mut self, gpu: &Gpu, units: u64, spare_bytes: u64) -> Result<u32, DeviceError> {
         let last = self.free.iter().next_back().map(|(&start, &length)| (start, start + length));
         let start = last.filter(|(_, end)| *end == self.capacity).map_or(self.capacity, |(start, _)| start);
         let needed = u64::from(start) + units;
@@ -81,8 +88,9 @@ impl Heap {
         if needed > most {
             return Err(gpu.too_large(self.label, needed * self.unit_bytes, most * self.unit_bytes));
         }
-        // by a half at least, so that what grows bit by bit is copied a few times only
-        let wanted = (u64::from(self.capacity) * 3 / 2).max(needed).min(most);
+        // by a half where it may, so that what grows bit by bit is copied a few times only
+        let spare = u64::from(self.capacity).saturating_add(spare_bytes / self.unit_bytes);
+        let wanted = (u64::from(self.capacity) * 3 / 2).min(spare).max(needed).min(most);
         let make =
             |units: u64| gpu.buffer(self.label, units * self.unit_bytes, USAGE).map(|b| (b, units as u32));
         let (buffer, capacity) = make(wanted).or_else(|_| make(needed))?;
@@ -104,3 +112,43 @@ impl Heap {
 
 const USAGE: wgpu::BufferUsages =
     wgpu::BufferUsages::STORAGE.union(wgpu::BufferUsages::COPY_DST).union(wgpu::BufferUsages::COPY_SRC);
+
+/// The buffers that parts and trees have places in.
+#[derive(Debug)]
+pub(super) struct Heaps {
+    /// Nodes of trees, [`NODE_BYTES`] each.
+    pub(super) nodes: Heap,
+    /// Triangles of leaves, [`TRIANGLE_BYTES`] each.
+    pub(super) triangles: Heap,
+    /// Indices and attributes, by words.
+    pub(super) words: Heap,
+    /// The linear values of sRGB's codes, then texels, by words.
+    pub(super) texels: Heap,
+}
+
+impl Heaps {
+    pub(super) fn new(gpu: &Gpu) -> Result<Self, DeviceError> {
+        let mut heaps = Self {
+            nodes: Heap::new(gpu, "nodes of trees", NODE_BYTES)?,
+            triangles: Heap::new(gpu, "triangles", TRIANGLE_BYTES)?,
+            words: Heap::new(gpu, "indices and attributes", 4)?,
+            texels: Heap::new(gpu, "textures", 4)?,
+        };
+        let table = heaps.take(gpu, |heaps| &mut heaps.texels, LINEAR_FROM_SRGB8.len() as u64)?;
+        heaps.texels.write(gpu, table.start, bytemuck::cast_slice(&*LINEAR_FROM_SRGB8));
+        Ok(heaps)
+    }
+
+    /// Takes a place of so many units in one of them. What a buffer grows by beyond that stays within the device's budget.
+    pub(super) fn take(
+        &mut self,
+        gpu: &Gpu,
+        heap: fn(&mut Self) -> &mut Heap,
+        units: u64,
+    ) -> Result<Range<u32>, DeviceError> {
+        let bytes: u64 =
+            [&self.nodes, &self.triangles, &self.words, &self.texels].map(Heap::bytes).iter().sum();
+        let spare_bytes = gpu.budget_bytes.saturating_sub(bytes);
+        heap(self).take(gpu, units, spare_bytes)
+    }
+}

@@ -122,7 +122,7 @@ impl GpuDevice {
 
     fn opened(&mut self) -> Result<&mut Open, DeviceError> {
         if self.open.is_none() {
-            let gpu = self.adapter.open()?;
+            let gpu = self.adapter.open(self.info.budget_bytes)?;
             let pipelines = Pipelines::new(&gpu, self.store.as_ref());
             let resident = Resident::new(&gpu)?;
             gpu.check()?;
@@ -272,13 +272,13 @@ impl Open {
         {
             return Ok(place.start);
         }
-        let texels = &mut self.resident.heaps.texels;
+        let heaps = &mut self.resident.heaps;
         if let Some((_, place)) = self.background.take() {
-            texels.give(place);
+            heaps.texels.give(place);
         }
         let bytes = parts::texels(texture);
-        let place = texels.take(&self.gpu, bytes.len() as u64 / 4)?;
-        texels.write(&self.gpu, place.start, bytes);
+        let place = heaps.take(&self.gpu, |heaps| &mut heaps.texels, bytes.len() as u64 / 4)?;
+        heaps.texels.write(&self.gpu, place.start, bytes);
         self.background = Some((name, place.clone()));
         Ok(place.start)
     }
@@ -288,14 +288,14 @@ impl Open {
         if records.top.is_empty() {
             return Ok(0..0);
         }
-        let nodes = &mut self.resident.heaps.nodes;
-        let place = nodes.take(&self.gpu, records.top.len() as u64)?;
+        let heaps = &mut self.resident.heaps;
+        let place = heaps.take(&self.gpu, |heaps| &mut heaps.nodes, records.top.len() as u64)?;
         let moved: Vec<PackedNode> = records
             .top
             .iter()
             .map(|node| PackedNode { child_base: node.child_base + place.start, ..*node })
             .collect();
-        nodes.write(&self.gpu, place.start, bytemuck::cast_slice(&moved));
+        heaps.nodes.write(&self.gpu, place.start, bytemuck::cast_slice(&moved));
         records.shot.top_node = place.start;
         Ok(place)
     }

@@ -1,13 +1,12 @@
 //! What a GPU holds: parts and trees at places of its heaps.
 
 use super::adapter::Gpu;
-use super::heap::Heap;
+use super::heap::{Heap, Heaps};
 use super::parts::{move_nodes, texels, triangle_slots, vertices, words};
 use super::records::{ABSENT, RefitTree};
-use crate::accel::{NODE_BYTES, PackedTree, Quality, TRIANGLE_BYTES};
+use crate::accel::{PackedTree, Quality, TRIANGLE_BYTES};
 use crate::clock::Stopwatch;
 use crate::device::{DeviceError, DeviceInfo, UpdateCost};
-use crate::math::LINEAR_FROM_SRGB8;
 use crate::plan::{Residency, Step, TreeState, UpdatePlan, tree_name};
 use crate::scene::{Frame, Geometry, Part, PartHash, Triangles};
 use rayon::ThreadPool;
@@ -18,33 +17,6 @@ use std::ops::Range;
 const TOP_NODES: u32 = 64;
 /// A GPU traces so fast that a tree is worth more than the least work; no splits: a tree is refitted.
 const QUALITY: Quality = Quality::Medium;
-
-/// The buffers that parts and trees have places in.
-#[derive(Debug)]
-pub(super) struct Heaps {
-    /// Nodes of trees, [`NODE_BYTES`] each.
-    pub(super) nodes: Heap,
-    /// Triangles of leaves, [`TRIANGLE_BYTES`] each.
-    pub(super) triangles: Heap,
-    /// Indices and attributes, by words.
-    pub(super) words: Heap,
-    /// The linear values of sRGB's codes, then texels, by words.
-    pub(super) texels: Heap,
-}
-
-impl Heaps {
-    pub(super) fn new(gpu: &Gpu) -> Result<Self, DeviceError> {
-        let mut heaps = Self {
-            nodes: Heap::new(gpu, "nodes of trees", NODE_BYTES)?,
-            triangles: Heap::new(gpu, "triangles", TRIANGLE_BYTES)?,
-            words: Heap::new(gpu, "indices and attributes", 4)?,
-            texels: Heap::new(gpu, "textures", 4)?,
-        };
-        let table = heaps.texels.take(gpu, LINEAR_FROM_SRGB8.len() as u64)?;
-        heaps.texels.write(gpu, table.start, bytemuck::cast_slice(&*LINEAR_FROM_SRGB8));
-        Ok(heaps)
-    }
-}
 
 /// Where a part is.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -275,14 +247,14 @@ impl Resident {
         heap: fn(&mut Heaps) -> &mut Heap,
         units: u64,
     ) -> Result<Range<u32>, DeviceError> {
-        if let Ok(place) = heap(&mut self.heaps).take(means.gpu, units) {
+        if let Ok(place) = self.heaps.take(means.gpu, heap, units) {
             return Ok(place);
         }
         for idle in self.residency.idle() {
             self.forget(idle);
             self.residency.evict(idle);
         }
-        heap(&mut self.heaps).take(means.gpu, units)
+        self.heaps.take(means.gpu, heap, units)
     }
 
     fn build(&mut self, name: PartHash, geometry: &Geometry, means: &Means) -> Result<(), DeviceError> {
