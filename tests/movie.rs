@@ -130,3 +130,15 @@ fn where_no_film_can_stand_is_told_before_the_work() {
         assert!(!t.path().join("it's").exists());
     }
 }
+
+#[test]
+fn a_film_takes_no_part_of_the_job() {
+    let t = tempfile::tempdir().unwrap();
+    for (file, told) in [("frames/f_1.obj", "input"), ("it's/f_1.png", "picture")] {
+        let file = t.path().join(file);
+        fs::create_dir_all(file.parent().unwrap()).unwrap();
+        let run = film_with(t.path(), Some(LISTS), &["--overwrite", "--movie", file.to_str().unwrap()]);
+        assert!(run.status == 2 && run.stderr.contains(told), "{}", run.stderr);
+    }
+    assert!(fs::read_to_string(t.path().join("frames/f_1.obj")).unwrap().starts_with('v'));
+}

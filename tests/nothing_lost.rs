@@ -2,7 +2,7 @@
 //! (CONTRACT 0.3, 4, 6).
 
 mod common;
-use common::{assert_same, pictures, render, report, start, wave};
+use common::{assert_same, pictures, render, rentix, report, start, wave};
 use std::path::Path;
 
 const SMALL: [&str; 2] = ["--size", "96x54"];
@@ -133,14 +133,19 @@ fn signals_stop_a_run_and_it_goes_on_later() {
         let t = t.path();
         let input = wave(&t.join("w"), 12, 16, 24);
         let args = ["--size", "640x360", "--samples", "16"];
-        let mut child = start(t, &input, "out", &args);
+        let mut command = rentix(t);
+        command.arg("render").arg(&input).arg("-o").arg(t.join("out")).args(args);
+        let mut child = command.stderr(std::process::Stdio::piped()).spawn().unwrap();
         while pictures_there(&t.join("out")) == 0 && child.try_wait().unwrap().is_none() {
             std::hint::spin_loop();
         }
         let kill =
             std::process::Command::new("kill").arg(signal).arg(child.id().to_string()).status().unwrap();
         assert!(kill.success());
-        assert_eq!(child.wait().unwrap().code(), Some(status));
+        let ended = child.wait_with_output().unwrap();
+        assert_eq!(ended.status.code(), Some(status));
+        let said = String::from_utf8_lossy(&ended.stderr);
+        assert!(said.contains("stopped: ") && said.contains("of 12 frames are left"), "{said}");
         let there = pictures(&t.join("out"));
         assert!(!there.is_empty() && there.len() < 12, "{} pictures", there.len());
         let frames: Vec<String> = there.keys().map(|n| n[5..9].trim_start_matches('0').to_string()).collect();
@@ -149,4 +154,56 @@ fn signals_stop_a_run_and_it_goes_on_later() {
         render(t, &input, "out", &[&args[..], &more].concat(), 0);
         assert_eq!(report(&r)["totals"]["resumed"], there.len() as u64);
     }
+}
+
+#[test]
+fn a_report_takes_no_part_of_the_job() {
+    let t = tempfile::tempdir().unwrap();
+    let t = t.path();
+    let input = wave(&t.join("w"), 3, 8, 12);
+    let job = t.join("job.yaml");
+    std::fs::write(&job, "sequence: w\n").unwrap();
+    let report_to = |file: &Path, status| {
+        render(t, &job, "out", &[&SMALL[..], &["--report", file.to_str().unwrap()]].concat(), status).stderr
+    };
+    for file in [input.join("wave_0001.obj"), input.join("wave.mtl"), job.clone()] {
+        let before = std::fs::read(&file).unwrap();
+        let said = report_to(&file, 2);
+        assert!(said.contains(file.to_str().unwrap()) && said.contains("--report"), "{said}");
+        assert_eq!(std::fs::read(&file).unwrap(), before);
+    }
+    assert!(report_to(&t.join("out/wave_0002.png"), 2).contains("picture"));
+    assert!(!t.join("out").exists(), "something was tried");
+    // a folder is no place for it, one of an earlier run is
+    assert!(report_to(&input, 2).contains("report"));
+    let file = t.join("r.json");
+    for resumed in [0, 3] {
+        report_to(&file, 0);
+        assert_eq!(report(&file)["totals"]["resumed"], resumed);
+    }
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn where_nothing_can_be_written_nothing_is_tried() {
+    let t = tempfile::tempdir().unwrap();
+    let t = t.path();
+    let input = wave(&t.join("w"), 3, 8, 12);
+    let said = render(t, &input, "/proc/rentix", &SMALL, 2).stderr;
+    assert!(said.contains("/proc/rentix") && said.lines().count() == 1, "{said}");
+}
+
+#[test]
+fn no_picture_takes_the_place_of_an_auxiliary_one() {
+    let t = tempfile::tempdir().unwrap();
+    let t = t.path();
+    std::fs::create_dir(t.join("x")).unwrap();
+    for name in ["a.obj", "a.aov.obj"] {
+        std::fs::write(t.join("x").join(name), "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n").unwrap();
+    }
+    let job = t.join("job.yaml");
+    let text = "sequence: x\naov: [depth]\noverrides: [{files: a.aov, format: exr, aov: []}]\n";
+    std::fs::write(&job, text).unwrap();
+    let said = render(t, &job, "out", &SMALL, 2).stderr;
+    assert!(said.contains("a.aov.exr") && said.contains("--name"), "{said}");
 }

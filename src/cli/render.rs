@@ -30,34 +30,40 @@ pub(super) fn render(args: &RenderArgs, global: &Global) -> Result<ExitCode> {
     let mut progress = Progress::new(kind, global.verbose);
     if let Some(file) = &args.movie {
         // told before the work, not after it
-        movie_can_be_made(file, args.overwrite)?;
+        movie_can_be_made(&job, file, args.overwrite)?;
     }
     let stop = stop::on_signals()?;
     let outcome = run::render(&job, &options, &fleet, &stop.asked, &mut |event| {
         if json {
-            println!("{}", event_json(event));
+            out!("{}", event_json(event));
         } else if !(global.quiet && matches!(event, Event::Warning(_))) {
             progress.event(event);
         }
     })?;
     progress.end();
     if json {
-        println!("{}", end_json(&outcome));
+        out!("{}", end_json(&outcome));
     }
-    let status = conclude(&job, &outcome, global, &stop);
+    let mut status = conclude(&job, &outcome, global, &stop);
+    if let Some(error) = &outcome.unsaved {
+        err!("error: {error}");
+        if status == ExitCode::SUCCESS {
+            status = ExitCode::from(EXIT_FAILED);
+        }
+    }
     match &args.movie {
         Some(file) if !outcome.stopped && outcome.failed().next().is_none() => {
             if let Err(error) = make_movie(&job, file) {
-                eprintln!("error: {error}");
+                err!("error: {error}");
                 let is_stopped = stop.asked.asked();
                 return Ok(ExitCode::from(if is_stopped { stop.exit_status() } else { EXIT_FAILED }));
             }
             if !global.quiet && !global.json {
-                eprintln!("{}", file.display());
+                err!("{}", file.display());
             }
         }
-        Some(file) if outcome.stopped => eprintln!("{}: no film is made of a part", file.display()),
-        Some(file) => eprintln!("{}: no film is made, for frames are missing", file.display()),
+        Some(file) if outcome.stopped => err!("{}: no film is made of a part", file.display()),
+        Some(file) => err!("{}: no film is made, for frames are missing", file.display()),
         None => {}
     }
     Ok(status)
@@ -115,9 +121,9 @@ fn dry_run(job: &Job, global: &Global) {
             let line = serde_json::json!({
                 "sequence": sequence.name, "frame": picture.frame, "source": source, "picture": path.display().to_string(),
             });
-            println!("{line}");
+            out!("{line}");
         } else {
-            println!("{} -> {}", source.unwrap_or_else(|| "nothing".to_string()), path.display());
+            out!("{} -> {}", source.unwrap_or_else(|| "nothing".to_string()), path.display());
         }
     }
 }
@@ -135,10 +141,13 @@ fn conclude(job: &Job, outcome: &Outcome, global: &Global, stop: &stop::OnSignal
                 let _ = write!(line, ", {count} {word}");
             }
         }
-        eprintln!("{line} in {:.1} s: {}", outcome.report.wall_s, job.folder.display());
+        err!("{line} in {:.1} s: {}", outcome.report.wall_s, job.folder.display());
     }
-    if !failed.is_empty() {
-        eprintln!(
+    if outcome.stopped {
+        let left = job.pictures.len() as u64 - totals.frames + totals.failed;
+        err!("stopped: {left} of {} frames are left; the same command renders them", job.pictures.len());
+    } else if !failed.is_empty() {
+        err!(
             "{} of {} frames are missing; render them with {}",
             failed.len(),
             job.pictures.len(),

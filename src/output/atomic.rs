@@ -14,6 +14,13 @@ pub fn write_atomic(path: &Path, bytes: &[u8]) -> Result<(), OutputError> {
     Temporary::write(path, bytes)?.place()
 }
 
+/// Makes a folder where there is none, and tries whether files can be written there.
+pub fn make_writable(folder: &Path) -> Result<(), OutputError> {
+    let path = folder.join(own_name(PREFIX, SUFFIX));
+    let tried = fs::create_dir_all(folder).and_then(|()| File::create(&path));
+    tried.map_err(OutputError::write(folder)).and_then(|_| remove(&path))
+}
+
 /// Content on its way to its place; removed where it does not get there.
 #[derive(Debug)]
 pub(super) struct Temporary {

@@ -24,7 +24,7 @@ mod run_log;
 mod sun;
 mod tiff;
 
-pub use atomic::write_atomic;
+pub use atomic::{make_writable, write_atomic};
 pub use compare::{PictureComparison, PictureOutcome, compare_paths};
 pub use difference::first_difference;
 pub use encoding::{Bits, Encoding, Format, PictureFile, encode, file_names, picture_files};

@@ -7,7 +7,7 @@ use super::report::Report;
 use super::{RunError, RunOptions};
 use crate::format;
 use crate::job::{Background, Job, Picture};
-use crate::output::{Records, file_names};
+use crate::output::{self, Records, file_names};
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 
@@ -32,6 +32,62 @@ pub(super) fn nothing_is_lost(job: &Job, records: &Records, options: &RunOptions
         Some(input) => Err(RunError::OverInput(input)),
         None => Ok(()),
     }
+}
+
+/// Makes the output folder; refuses one where nothing can be written, unless all pictures are there.
+pub(super) fn can_be_written(job: &Job, records: &Records, options: &RunOptions) -> Result<(), RunError> {
+    let is_there = |p: PathBuf| records.names(&p) && job.folder.join(p).is_file();
+    let are_there = job.pictures.iter().all(|picture| files_of(picture).into_iter().all(is_there));
+    if are_there && (!options.overwrite || job.pictures.is_empty()) {
+        return Ok(());
+    }
+    Ok(output::make_writable(&job.folder)?)
+}
+
+/// Refuses pictures of which one would take the place of another's auxiliary ones.
+pub(super) fn each_has_its_place(job: &Job) -> Result<(), RunError> {
+    let mut places = HashSet::new();
+    for picture in job.pictures.iter().filter(|p| !p.settings.aovs.is_empty()) {
+        places.extend(files_of(picture));
+    }
+    // their own were found to differ when the job was read
+    let is_taken = |p: &&Picture| p.settings.aovs.is_empty() && places.contains(Path::new(&p.picture));
+    match job.pictures.iter().find(is_taken) {
+        Some(picture) => Err(RunError::Twice(job.folder.join(&picture.picture))),
+        None => Ok(()),
+    }
+}
+
+/// Refuses a background that none of the frames will have.
+pub(super) fn background_is_there(job: &Job) -> Result<(), RunError> {
+    let missing = |picture: &Picture| match &picture.settings.background {
+        Background::File(file) if !file.exists() => Some(file.clone()),
+        _ => None,
+    };
+    let mut files = job.pictures.iter().map(missing);
+    match files.next().flatten() {
+        Some(file) if files.all(|file| file.is_some()) => Err(RunError::Background(file)),
+        _ => Ok(()),
+    }
+}
+
+/// What of a job a file is that something else than a picture is to be written to, where it is a part of it. One that has the
+/// mark was written by a run.
+pub(super) fn part_of_job(job: &Job, file: &Path, mark: &str) -> Option<&'static str> {
+    let place = place(file);
+    let is_place =
+        |p: PathBuf| p.file_name() == file.file_name() && self::place(&job.folder.join(p)) == place;
+    if job.pictures.iter().flat_map(files_of).any(is_place) {
+        return Some("a picture of this job goes there");
+    }
+    let is_input = file.exists() && !output::has_mark(file, mark) && input_files(job).contains(&place);
+    is_input.then_some("it is an input of this job")
+}
+
+/// Where a file is or will be.
+fn place(file: &Path) -> PathBuf {
+    let new = || Some(real(file.parent()?)?.join(file.file_name()?));
+    real(file).or_else(new).or_else(|| std::path::absolute(file).ok()).unwrap_or_else(|| file.to_path_buf())
 }
 
 /// Every file that the job reads, by its real path.

@@ -113,6 +113,9 @@ pub struct FrameReport {
     /// Where several sequences have the same numbers only their place in the job tells pictures apart.
     #[serde(skip)]
     pub index: usize,
+    /// Its place among those that were taken; None: it was not.
+    #[serde(skip)]
+    pub taken: Option<u64>,
     /// Whether it failed because no device could hold or keep it.
     #[serde(skip)]
     pub device_failed: bool,

@@ -28,7 +28,7 @@ pub use fleet::Fleet;
 pub use forecast::{Forecast, forecast};
 pub use movie::{MovieError, make_movie, movie_can_be_made};
 pub use read::{PICTURE_VERSION, read_frame, read_shot};
-pub use report::{DeviceReport, Report, Totals};
+pub use report::{DeviceReport, Report, Totals, Unsaved};
 pub use source::Sources;
 
 use crate::clock::Stopwatch;
@@ -108,6 +108,23 @@ pub enum RunError {
     /// A picture would go where an input is.
     #[error("{} is an input of this job and would be overwritten; nothing is rendered (-o names another folder)", .0.display())]
     OverInput(PathBuf),
+    /// A picture would take the place of an auxiliary one.
+    #[error("{} would be the picture of one frame and an auxiliary one of another; nothing is rendered (--name names them otherwise)", .0.display())]
+    Twice(PathBuf),
+    /// The background of all frames is not there.
+    #[error("{}: there is no such background; nothing is rendered", .0.display())]
+    Background(PathBuf),
+    /// The report would go where a part of the job is.
+    #[error("{}: the report cannot stand there: {why}; nothing is rendered (--report names another file)", .file.display())]
+    ReportPlace {
+        /// Where.
+        file: PathBuf,
+        /// What is there.
+        why: &'static str,
+    },
+    /// The report cannot be written.
+    #[error(transparent)]
+    Unsaved(#[from] Unsaved),
     /// The output folder cannot be used.
     #[error(transparent)]
     Output(#[from] OutputError),
@@ -117,9 +134,6 @@ pub enum RunError {
     /// There is no place for temporary pictures.
     #[error("no temporary folder can be made: {0}; TMPDIR names another place")]
     NoRoom(std::io::Error),
-    /// The report cannot be written; the pictures are there.
-    #[error("the report cannot be written: {0}")]
-    Report(OutputError),
 }
 
 /// How a run ended.
@@ -129,6 +143,8 @@ pub struct Outcome {
     pub report: Report,
     /// Whether it was stopped before its end.
     pub stopped: bool,
+    /// Why the report is not where it should be.
+    pub unsaved: Option<Unsaved>,
 }
 
 impl Outcome {
@@ -165,9 +181,19 @@ pub fn render(
     let [rss_before, peak_before] = [machine::rss_bytes(), machine::peak_rss_bytes()];
     let records = Records::read(&job.folder)?;
     check::nothing_is_lost(job, &records, options)?;
+    check::each_has_its_place(job)?;
+    check::background_is_there(job)?;
+    if let Some(file) = &options.report
+        && let Some(why) = check::part_of_job(job, file, report::MARK)
+    {
+        return Err(RunError::ReportPlace { file: file.clone(), why });
+    }
+    check::can_be_written(job, &records, options)?;
+    let mut saved = report::Saver::new(options.report.clone());
+    let mut report = Report::new(fleet.reports(), options.keeps_reports || options.report.is_some());
+    saved.save(&mut report, &since, true)?;
     clean_up(job);
     let mut warnings = Warnings::default();
-    let mut report = Report::new(fleet.reports(), options.keeps_reports || options.report.is_some());
     on_event(&Event::Start {
         frames: job.pictures.len(),
         folder: job.folder.display().to_string(),
@@ -193,7 +219,6 @@ pub fn render(
     let trees = devices.iter().filter(|device| device.info.kind == DeviceKind::Cpu).count();
     let at_once = [on_their_way, trees].map(|n| n as u64);
     let reader = read::Reader::new(job, options, &records, prepared, &estimator, at_once);
-    let mut saved = report::Saver::new(options.report.clone());
 
     std::thread::scope(|scope| {
         let (note, notes) = channel::<Note>();
@@ -268,7 +293,8 @@ pub fn render(
     report.warnings = warnings.list().iter().map(ToString::to_string).collect();
     report.settle(&since);
     let stopped = stop.asked();
-    saved.save(&mut report, &since, true).map_err(RunError::Report).map(|()| Outcome { report, stopped })
+    let unsaved = saved.save(&mut report, &since, true).err();
+    Ok(Outcome { report, stopped, unsaved })
 }
 
 /// What a caught panic says, for the error of its frame.

@@ -1,5 +1,6 @@
 //! The pictures of a job as a film, by ffmpeg.
 
+use super::check::part_of_job;
 use crate::job::Job;
 use crate::output::has_mark;
 use std::fmt::Write as _;
@@ -42,12 +43,12 @@ pub enum MovieError {
 /// Stands in each film, and tells it from files that others made.
 const MARK: &str = "made by rentix";
 
-/// Whether ffmpeg can be started, and its film may stand there.
+/// Whether ffmpeg can be started, and its film of a job may stand there.
 ///
 /// # Errors
-/// Where not: there is no such folder, no ending that tells the format, or a file that is no film of this program and is not to
-/// be written over.
-pub fn movie_can_be_made(file: &Path, overwrite: bool) -> Result<(), MovieError> {
+/// Where not: there is no such folder, no ending that tells the format, a file that is no film of this program and is not to be
+/// written over, or a file of the job.
+pub fn movie_can_be_made(job: &Job, file: &Path, overwrite: bool) -> Result<(), MovieError> {
     let place = |why| Err(MovieError::Place { file: file.to_path_buf(), why });
     if !folder_of(file).is_dir() {
         return place("there is no such folder; make it first");
@@ -57,6 +58,9 @@ pub fn movie_can_be_made(file: &Path, overwrite: bool) -> Result<(), MovieError>
     }
     if !overwrite && file.symlink_metadata().is_ok() && !has_mark(file, MARK) {
         return place("the file there was not made by rentix; --overwrite replaces it");
+    }
+    if let Some(why) = part_of_job(job, file, MARK) {
+        return place(why);
     }
     let started = Command::new("ffmpeg").arg("-version").stdin(Stdio::null()).output();
     match started {

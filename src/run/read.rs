@@ -75,8 +75,12 @@ pub(super) fn read_stage(
         let index = turn.index;
         let bytes = expected_bytes(reader.job, &reader.job.pictures[index]);
         share.take_bytes(turn, bytes);
-        let outcome = catch_unwind(AssertUnwindSafe(|| reader.read(index, bytes, &mut warnings)))
+        let mut outcome = catch_unwind(AssertUnwindSafe(|| reader.read(index, bytes, &mut warnings)))
             .unwrap_or_else(|panic| Err(reader.failed(index, &panic_text("reading", &*panic))));
+        match &mut outcome {
+            Ok(read) => read.report.taken = Some(turn.taken),
+            Err(report) => report.taken = Some(turn.taken),
+        }
         if !warnings.is_empty() {
             let _ = note.send(Note::Warnings(warnings));
         }
@@ -209,6 +213,7 @@ impl<'a> Reader<'a> {
             ms: StageTimes::default(),
             predicted_ms: StageTimes::default(),
             index,
+            taken: None,
             device_failed: false,
         })
     }

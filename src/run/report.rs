@@ -1,4 +1,4 @@
-//! `--report`: what the run did, as JSON, replaced whole at most once a second and always at the end.
+//! `--report`: what the run did, as JSON, replaced whole: at the beginning, at most once a second, and always at the end.
 
 use super::event::{FrameReport, Status};
 use super::machine::{Machine, machine, peak_rss_bytes};
@@ -117,7 +117,7 @@ pub struct Report {
     pub devices: Vec<DeviceReport>,
     /// Counts.
     pub totals: Totals,
-    /// The frames in the order of the job: all, or only those that failed.
+    /// The frames in the order in which they were taken: all, or only those that failed.
     pub frames: Vec<FrameReport>,
     #[serde(skip)]
     keeps_all: bool,
@@ -161,7 +161,7 @@ impl Report {
         }
         self.totals.frames_per_s = self.totals.frames as f64 / self.wall_s.max(1e-9);
         self.totals.peak_rss_bytes = peak_rss_bytes();
-        self.frames.sort_by_key(|f| f.index);
+        self.frames.sort_by_key(|f| (f.taken.is_none(), f.taken, f.index));
     }
 
     /// The report as JSON.
@@ -171,7 +171,20 @@ impl Report {
     }
 }
 
-/// Writes the report: at most once a second, for less than a hundredth of the run's time, and at the end.
+/// Stands in each report, and tells it from files that others made.
+pub(super) const MARK: &str = "\"rentix\": \"";
+
+/// A report that is not where it should be.
+#[derive(Debug, thiserror::Error)]
+#[error("{}: the report cannot be written: {why}; --report names another file", .file.display())]
+pub struct Unsaved {
+    /// Where it should be.
+    pub file: PathBuf,
+    /// What the system says.
+    pub why: String,
+}
+
+/// Writes the report: at the beginning, at most once a second, for less than a hundredth of the run's time, and at the end.
 #[derive(Debug)]
 pub(super) struct Saver {
     path: Option<PathBuf>,
@@ -187,22 +200,29 @@ impl Saver {
         Self { path, saved_s: 0.0, cost_s: 0.0 }
     }
 
-    /// Saves if it is time to; at the end always. What cannot be written becomes a warning of the report at the end.
+    /// Saves if it is time to, or anyway.
     pub(super) fn save(
         &mut self,
         report: &mut Report,
         since: &Stopwatch,
-        at_end: bool,
-    ) -> Result<(), OutputError> {
+        anyway: bool,
+    ) -> Result<(), Unsaved> {
         let Some(path) = &self.path else { return Ok(()) };
         let now_s = since.s();
-        if !at_end && now_s - self.saved_s < SAVE_EVERY_S.max(self.cost_s / SAVE_SHARE_MAX) {
+        if !anyway && now_s - self.saved_s < SAVE_EVERY_S.max(self.cost_s / SAVE_SHARE_MAX) {
             return Ok(());
         }
         report.settle(since);
         let written = output::write_atomic(path, &report.json());
         self.saved_s = since.s();
         self.cost_s = self.saved_s - now_s;
-        written
+        written.map_err(|error| Unsaved {
+            file: path.clone(),
+            why: if let OutputError::Write { source, .. } = error {
+                source.to_string()
+            } else {
+                error.to_string()
+            },
+        })
     }
 }

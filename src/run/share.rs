@@ -26,6 +26,8 @@ pub(super) struct Turn {
     pub(super) index: usize,
     /// Its place among all of its run that are read for that device, which takes them in that order.
     pub(super) place: u64,
+    /// Its place among all of its run.
+    pub(super) taken: u64,
 }
 
 /// The frames of all runs, shared out.
@@ -436,9 +438,10 @@ impl State {
             }
             feed.given += 1;
             let Some(run) = self.runs.get_mut(&job) else { break };
+            let taken = run.turns.iter().map(|turns| turns.given).sum();
             let given = &mut run.turns[device].given;
             *given += 1;
-            return (Some(Turn { device, index: frame as usize, place: *given - 1 }), others);
+            return (Some(Turn { device, index: frame as usize, place: *given - 1, taken }), others);
         }
         (None, others)
     }
