@@ -23,6 +23,7 @@ const HOUSE: House = House {
         "src/accel/lanes.rs",
         "src/accel/traced.rs",
         "src/accel/stack.rs",
+        "src/cli/driver.rs",
         "src/device/gpu/adapter.rs",
         "src/device/gpu/cache.rs",
         "src/device/gpu/pipelines.rs",
@@ -124,18 +125,13 @@ const ONE_PLACE: &[OnePlace] = &[
     },
     OnePlace {
         rule: "only cli prints",
-        names: &[
-            "print!",
-            "println!",
-            "eprint!",
-            "eprintln!",
-            "std::io::stdout",
-            "std::io::stderr",
-            "std::io::Stdout",
-            "std::io::Stderr",
-            "indicatif",
-        ],
-        places: Places::Only(&["cli", "main"]),
+        names: &["std::io::stderr", "std::io::Stdout", "std::io::Stderr", "anstream", "indicatif"],
+        places: Places::Only(&["cli"]),
+    },
+    OnePlace {
+        rule: "only cli/say prints lines: those that cannot be said end nothing",
+        names: &["print!", "println!", "eprint!", "eprintln!", "std::io::stdout"],
+        places: Places::Only(&["cli/say"]),
     },
     OnePlace {
         rule: "only clock reads clocks",

@@ -26,6 +26,8 @@ fn wrong_use_ends_in_2_and_writes_nothing() {
     refused(&input, &["--device", "gpu:99"], "gpu:99");
     refused(&input, &["--size", "0x9"], "size");
     refused(&input, &["--chunk", "3/2"], "chunk");
+    refused(&input, &["--samples=-1"], "1..=65536");
+    refused(&input, &["--device", "cpu,"], "no device ``");
     std::fs::write(t.join("file"), "kept").unwrap();
     let said = render(t, &input, "file", &[], 2).stderr;
     assert!(said.contains("file"), "{said}");
@@ -160,4 +162,74 @@ fn media_that_are_too_deep_are_told_of() {
         said.contains("p.obj") && said.contains("more than 8 media") && said.contains("(64 times)"),
         "{said}"
     );
+}
+
+/// What is missing for all is told once, before anything is tried.
+#[test]
+fn a_background_that_no_frame_has_ends_in_2() {
+    let t = tempfile::tempdir().unwrap();
+    let t = t.path();
+    let input = wave(&t.join("w"), 3, 4, 6);
+    let said = render(t, &input, "out", &["--background", "gone.hdr"], 2).stderr;
+    assert!(said.contains("gone.hdr") && said.lines().count() == 1, "{said}");
+    // where it is one frame's it fails that alone
+    let job = t.join("job.yaml");
+    std::fs::write(&job, "sequence: w\noverrides: [{frames: 2, background: gone.hdr}]\n").unwrap();
+    assert!(render(t, &job, "out", &["--size", "32x18"], 1).stderr.contains("--frames 2"));
+}
+
+/// Whoever reads may go at any time.
+#[cfg(unix)]
+#[test]
+fn a_reader_that_is_gone_ends_nothing() {
+    let t = tempfile::tempdir().unwrap();
+    let t = t.path();
+    let input = wave(&t.join("w"), 3, 4, 6);
+    let (input, out, file) = (input.to_str().unwrap(), t.join("out"), t.join("r.json"));
+    let (out, file) = (out.to_str().unwrap(), file.to_str().unwrap());
+    let small = ["render", input, "-o", out, "--size", "32x18", "--report", file];
+    for args in [
+        [&small[..], &["--json"]].concat(),
+        [&small[..], &["--overwrite", "--progress", "openjd"]].concat(),
+        [&small[..], &["--overwrite", "--progress", "plain", "-v"]].concat(),
+        vec!["inspect", input, "--device", "cpu"],
+        vec!["devices", "--json"],
+        vec!["completions", "bash"],
+    ] {
+        let (reader, writer) = std::io::pipe().unwrap();
+        drop(reader);
+        let mut command = common::rentix(t);
+        command.args(&args).stdout(writer.try_clone().unwrap()).stderr(writer);
+        assert_eq!(command.status().unwrap().code(), Some(0), "{args:?}");
+    }
+    assert_eq!(report(t.join("r.json").as_path())["totals"]["frames"], 3);
+}
+
+#[test]
+fn colors_are_where_they_are_asked_for() {
+    let t = tempfile::tempdir().unwrap();
+    let absent = ["inspect", "absent"];
+    for (more, is_colored) in [(&[][..], false), (&["--color", "always"], true), (&["--color=never"], false)]
+    {
+        let said = run(t.path(), [&absent[..], more].concat()).stderr;
+        assert_eq!(said.contains("\u{1b}[1;31merror:"), is_colored, "{said:?}");
+    }
+}
+
+/// What a device has before it is told by the frames before in the list.
+#[test]
+fn the_report_has_frames_in_the_order_in_which_they_were_taken() {
+    let t = tempfile::tempdir().unwrap();
+    let t = t.path();
+    let input = wave(&t.join("w"), 12, 4, 6);
+    let file = t.join("r.json");
+    let more = ["--size", "32x18", "--device", "cpu/2", "--report", file.to_str().unwrap()];
+    render(t, &input, "out", &more, 0);
+    let report = report(&file);
+    for device in ["cpu:0", "cpu:1"] {
+        let frames = report["frames"].as_array().unwrap().iter().filter(|f| f["device"] == device);
+        let loads: Vec<bool> = frames.map(|f| f["update"]["action"] == "load").collect();
+        assert!(loads.iter().skip(1).all(|load| !load), "{device}: {loads:?}");
+        assert!(loads.first().is_none_or(|&load| load), "{device}: {loads:?}");
+    }
 }

@@ -72,16 +72,16 @@ pub(super) fn bench(args: &BenchArgs, global: &Global) -> Result<ExitCode> {
     };
     let workloads: Vec<Workload> = WORKLOADS.into_iter().filter(is_asked).collect();
     let slower = bench::bench(&workloads, options, args.baseline.as_deref(), &mut |event| match event {
-        Event::Stage(what) if !(global.quiet || global.json) => eprintln!("{what} ..."),
+        Event::Stage(what) if !(global.quiet || global.json) => err!("{what} ..."),
         Event::Stage(_) => {}
         Event::Table(table) if global.json => {
-            println!("{}", serde_json::to_value(table).unwrap_or_default());
+            out!("{}", serde_json::to_value(table).unwrap_or_default());
         }
-        Event::Table(table) => println!("{table}"),
-        Event::LeftOut(what, why) => eprintln!("{what} is left out: {why}"),
+        Event::Table(table) => out!("{table}"),
+        Event::LeftOut(what, why) => err!("{what} is left out: {why}"),
     })?;
     for one in &slower {
-        eprintln!("{one}");
+        err!("{one}");
     }
     Ok(if slower.is_empty() { ExitCode::SUCCESS } else { ExitCode::from(EXIT_FAILED) })
 }

@@ -44,12 +44,12 @@ pub(super) fn cache(args: &CacheArgs, global: &Global) -> Result<ExitCode> {
             "folder": root.to_string(), "entries": entries, "bytes": bytes, "limit_bytes": limit_bytes,
             "removed": removed,
         });
-        println!("{line}");
+        out!("{line}");
     } else {
         if !matches!(args.what, What::Stat) {
-            println!("{} entries removed, {} bytes", removed.entries, removed.bytes);
+            out!("{} entries removed, {} bytes", removed.entries, removed.bytes);
         }
-        println!("{root}: {entries} entries, {bytes} bytes of {limit_bytes}");
+        out!("{root}: {entries} entries, {bytes} bytes of {limit_bytes}");
     }
     Ok(ExitCode::SUCCESS)
 }

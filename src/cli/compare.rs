@@ -35,15 +35,15 @@ pub(super) fn compare(args: &CompareArgs, global: &Global) -> Result<ExitCode> {
             PictureOutcome::Incomparable(why) => {
                 differ += 1;
                 if global.json {
-                    println!("{}", serde_json::json!({"event": "incomparable", "name": name, "error": why}));
+                    out!("{}", serde_json::json!({"event": "incomparable", "name": name, "error": why}));
                 } else {
-                    println!("{name}: {why}");
+                    out!("{name}: {why}");
                 }
             }
         }
     }
     if !global.json && !global.quiet {
-        eprintln!("{} pictures compared, {differ} differ", pictures.len());
+        err!("{} pictures compared, {differ} differ", pictures.len());
     }
     Ok(if differ == 0 { ExitCode::SUCCESS } else { ExitCode::from(EXIT_FAILED) })
 }
@@ -51,14 +51,14 @@ pub(super) fn compare(args: &CompareArgs, global: &Global) -> Result<ExitCode> {
 fn tell(name: &str, c: &Comparison, allowed: bool, global: &Global) {
     if global.json {
         let line = serde_json::json!({"picture": name, "max": c.max, "rmse": c.rmse, "psnr": c.psnr, "flip": c.flip});
-        println!("{line}");
+        out!("{line}");
     } else if c.psnr.is_none() {
         if global.verbose {
-            println!("{name}: equal");
+            out!("{name}: equal");
         }
     } else {
         let psnr = c.psnr.map_or_else(|| "infinite".to_string(), |p| format!("{p:.1} dB"));
         let verdict = if allowed { ", within --flip" } else { "" };
-        println!("{name}: max {:.4}, RMSE {:.6}, PSNR {psnr}, FLIP {:.5}{verdict}", c.max, c.rmse, c.flip);
+        out!("{name}: max {:.4}, RMSE {:.6}, PSNR {psnr}, FLIP {:.5}{verdict}", c.max, c.rmse, c.flip);
     }
 }

@@ -8,6 +8,6 @@ use std::process::ExitCode;
 pub(super) fn completions(shell: Shell) -> ExitCode {
     let mut script = Vec::new();
     clap_complete::generate(shell, &mut super::Cli::command(), "rentix", &mut script);
-    print!("{}", String::from_utf8_lossy(&script));
+    out!("{}", String::from_utf8_lossy(&script).trim_end());
     ExitCode::SUCCESS
 }

@@ -25,35 +25,39 @@ pub(super) fn tell_costs(
                 "thesis": {"start_ms": 1e3 * thesis.start_s, "render_ms": 1e3 * thesis.render_s,
                            "host_bytes": 1e6 * thesis.host_mb, "device_bytes": 1e6 * thesis.device_mb},
             });
-            println!("{line}");
+            out!("{line}");
         }
         return;
     }
     let names = devices.iter().map(|d| d.name.chars().count()).max().unwrap_or(0).max(6);
-    println!("expected, ms");
-    print!("{:names$}", "");
-    for column in ["read", "parse", "load", "update", "trace", "encode", "write"] {
-        print!(" {column:>7}");
-    }
-    println!(" {:>16} {:>16} {:>16}", "first frame", "next, on device", "resident, MB");
+    out!("expected, ms");
+    let terms =
+        ["read", "parse", "load", "update", "trace", "encode", "write"].map(|term| format!(" {term:>7}"));
+    out!(
+        "{:names$}{} {:>16} {:>16} {:>16}",
+        "",
+        terms.concat(),
+        "first frame",
+        "next, on device",
+        "resident, MB"
+    );
     for (device, c) in devices.iter().zip(costs) {
-        print!("{:names$}", device.name);
-        for e in [c.read, c.parse, c.load, c.update, c.trace, c.encode, c.write] {
-            print!(" {:>7}", Cell::Number(1e3 * e.value));
-        }
+        let terms = [c.read, c.parse, c.load, c.update, c.trace, c.encode, c.write];
+        let terms = terms.map(|e| format!(" {:>7}", Cell::Number(1e3 * e.value)));
         let with_error = |e: Expected, unit: f64| {
             format!("{} ± {}", Cell::Number(e.value / unit), Cell::Number(e.error / unit))
         };
-        println!(
-            " {:>16} {:>16} {:>16}",
+        out!(
+            "{:names$}{} {:>16} {:>16} {:>16}",
+            device.name,
+            terms.concat(),
             with_error(c.cold(), 1e-3),
             with_error(c.warm(), 1e-3),
             with_error(c.resident, 1e6)
         );
     }
-    println!(
-        "{:names$} start {}, render {}; memory of the host {} MB, of the device {} MB",
-        "thesis",
+    out!(
+        "by the formulas of the thesis of 2012: start {}, render {}; memory of the host {} MB, of the device {} MB",
         Cell::Number(1e3 * thesis.start_s),
         Cell::Number(1e3 * thesis.render_s),
         Cell::Number(thesis.host_mb),
@@ -61,7 +65,7 @@ pub(super) fn tell_costs(
     );
     for (device, c) in devices.iter().zip(costs) {
         if c.resident.value > device.budget_bytes as f64 {
-            println!(
+            out!(
                 "{} may hold {} MB: the frames will be refused there (raise --device-memory, or use another device)",
                 device.name,
                 Cell::Number(device.budget_bytes as f64 / 1e6)

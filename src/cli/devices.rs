@@ -18,9 +18,9 @@ pub(super) fn devices(global: &Global) -> Result<ExitCode> {
             "name": info.name, "kind": info.kind.word(), "description": info.description,
             "threads": info.threads, "budget_bytes": info.budget_bytes,
         });
-        println!("{line}");
+        out!("{line}");
     } else {
-        eprintln!(
+        err!(
             "{}  {}, {}, may hold {} (half of the free memory; --device-memory changes it)",
             info.name,
             machine::machine().cpu,
@@ -30,9 +30,9 @@ pub(super) fn devices(global: &Global) -> Result<ExitCode> {
     }
     for adapter in adapters() {
         if global.json {
-            println!("{}", as_json(&adapter));
+            out!("{}", as_json(&adapter));
         } else {
-            eprintln!("{}", for_people(&adapter));
+            err!("{}", for_people(&adapter));
         }
     }
     Ok(ExitCode::SUCCESS)

@@ -47,7 +47,7 @@ pub(super) fn inspect(args: &RenderArgs, global: &Global) -> Result<ExitCode> {
         match read_frame(&job, picture, &sources, args.lenient, &mut warnings) {
             Err(error) => {
                 failed += 1;
-                eprintln!("error: {error}");
+                err!("error: {error}");
             }
             Ok(frame) => {
                 let before = latest.as_ref().filter(|(p, ..)| p.sequence == picture.sequence);
@@ -75,7 +75,7 @@ pub(super) fn inspect(args: &RenderArgs, global: &Global) -> Result<ExitCode> {
 
 fn say(global: &Global, line: &str) {
     if !global.quiet {
-        eprintln!("{line}");
+        err!("{line}");
     }
 }
 
@@ -99,17 +99,21 @@ fn tell(job: &Job, picture: &Picture, seen: &Seen, first: bool, global: &Global)
             "sequence": sequence.name, "frame": picture.frame, "source": source, "triangles": seen.triangles,
             "vertices": seen.vertices, "meshes": seen.meshes, "materials": seen.materials, "change": seen.change,
         });
-        println!("{line}");
+        out!("{line}");
         return;
     }
     if first {
-        println!("{}", sequence.name);
-        println!(
+        out!("{}", sequence.name);
+        out!(
             "{:>24} {:>10} {:>10} {:>7} {:>9}  change",
-            "frame", "triangles", "vertices", "meshes", "materials"
+            "frame",
+            "triangles",
+            "vertices",
+            "meshes",
+            "materials"
         );
     }
-    println!(
+    out!(
         "{source:>24} {:>10} {:>10} {:>7} {:>9}  {}",
         seen.triangles,
         seen.vertices,

@@ -1,11 +1,15 @@
 //! What was typed, what it means, a call below; the only room that prints.
 
+#[macro_use]
+mod say;
+
 mod bench;
 mod cache;
 mod compare;
 mod completions;
 mod costs;
 mod devices;
+mod driver;
 mod inspect;
 mod progress;
 mod render;
@@ -17,7 +21,7 @@ mod store;
 mod verify;
 mod watch;
 
-use clap::{Args, Parser, Subcommand, ValueEnum};
+use clap::{Args, CommandFactory as _, FromArgMatches as _, Parser, Subcommand, ValueEnum};
 use std::process::ExitCode;
 
 /// Something was asked for that is not there now (also: pictures differ).
@@ -123,8 +127,17 @@ enum Command {
 
 /// Runs the program; the exit status is CONTRACT 1's.
 pub fn main() -> ExitCode {
+    driver::needs_no_display();
     stop::early();
-    let cli = match Cli::try_parse() {
+    let color = say::color(std::env::args_os());
+    color.write_global();
+    let color = match color {
+        anstream::ColorChoice::Always => clap::ColorChoice::Always,
+        anstream::ColorChoice::Never => clap::ColorChoice::Never,
+        _ => clap::ColorChoice::Auto,
+    };
+    let matches = Cli::command().color(color).try_get_matches();
+    let cli = match matches.and_then(|matches| Cli::from_arg_matches(&matches)) {
         Ok(cli) => cli,
         Err(error) => {
             // a closed pipe is no reason to fail
@@ -144,7 +157,18 @@ pub fn main() -> ExitCode {
         Command::Completions { shell } => Ok(completions::completions(*shell)),
     };
     ended.unwrap_or_else(|error| {
-        eprintln!("error: {error:#}");
+        err!("error: {}", said_once(&error));
         ExitCode::from(EXIT_USE)
     })
+}
+
+/// An error and its causes, without those that it names itself.
+fn said_once(error: &anyhow::Error) -> String {
+    let mut text = error.to_string();
+    for cause in error.chain().skip(1).map(ToString::to_string) {
+        if !text.contains(&cause) {
+            text = format!("{text}: {cause}");
+        }
+    }
+    text
 }

@@ -133,13 +133,13 @@ impl Progress {
         self.keep_state();
         let percent = 100.0 * self.ended.min(self.frames) as f64 / self.frames.max(1) as f64;
         match self.kind {
-            ProgressKind::Openjd => println!("openjd_progress: {percent:.1}"),
-            ProgressKind::Alf => println!("ALF_PROGRESS {percent:.0}%"),
+            ProgressKind::Openjd => out!("openjd_progress: {percent:.1}"),
+            ProgressKind::Alf => out!("ALF_PROGRESS {percent:.0}%"),
             ProgressKind::Afanasy => {
-                println!("PROGRESS: {percent:.0}%");
+                out!("PROGRESS: {percent:.0}%");
                 if frame.status != Status::Failed {
                     // what its monitor shows of the frame
-                    println!("@IMAGE@{}", Path::new(&self.folder).join(&frame.picture).display());
+                    out!("@IMAGE@{}", Path::new(&self.folder).join(&frame.picture).display());
                 }
             }
             _ => {}
@@ -169,8 +169,8 @@ impl Progress {
     /// Prints a line above the bar.
     pub(super) fn line(&self, text: &str) {
         match &self.bar {
-            Some(bar) => bar.suspend(|| eprintln!("{text}")),
-            None => eprintln!("{text}"),
+            Some(bar) => bar.suspend(|| err!("{text}")),
+            None => err!("{text}"),
         }
     }
 
@@ -181,13 +181,13 @@ impl Progress {
         }
         if self.kind == ProgressKind::Openjd {
             let (done, failed) = (self.ended - self.failed, self.failed);
-            println!("openjd_status: {done} of {} frames, {failed} failed", self.frames);
+            out!("openjd_status: {done} of {} frames, {failed} failed", self.frames);
             if failed > 0 {
-                println!("openjd_fail: {failed} frames failed");
+                out!("openjd_fail: {failed} frames failed");
             }
         }
         for (text, files) in self.warned.iter().filter(|(_, files)| **files > FILES_TOLD && !self.verbose) {
-            eprintln!("warning: the same for {} more files: {text}", files - FILES_TOLD);
+            err!("warning: the same for {} more files: {text}", files - FILES_TOLD);
         }
     }
 }

@@ -1,7 +1,8 @@
 //! The options of `rentix render`, as typed.
 
 use super::progress::ProgressKind;
-use super::size;
+use super::size::{self, whole};
+use crate::job::options::limits;
 use crate::plan::Update;
 use crate::schedule::Policy;
 use clap::Args;
@@ -70,10 +71,10 @@ pub(super) struct RenderArgs {
     #[arg(long, help_heading = "Output")]
     pub alpha: bool,
     /// Bits a channel: 8 or 16 [default: 8]
-    #[arg(long, value_name = "N", help_heading = "Output")]
+    #[arg(long, value_parser = clap::value_parser!(u8).range(whole(&limits::BITS)), value_name = "N", help_heading = "Output")]
     pub bits: Option<u8>,
     /// Quality of jpg, 1 to 100 [default: 92]
-    #[arg(long, value_name = "N", help_heading = "Output")]
+    #[arg(long, value_parser = clap::value_parser!(u8).range(whole(&limits::QUALITY)), value_name = "N", help_heading = "Output")]
     pub quality: Option<u8>,
     /// Brighten by so many stops before the sRGB curve
     #[arg(long, value_name = "STOPS", allow_negative_numbers = true, help_heading = "Output")]
@@ -146,13 +147,13 @@ pub(super) struct RenderArgs {
     pub mtl_color: Option<String>,
 
     /// Samples a pixel [default: 1]
-    #[arg(long, value_name = "N", help_heading = "Quality")]
+    #[arg(long, value_parser = clap::value_parser!(u32).range(whole(&limits::SAMPLES)), value_name = "N", help_heading = "Quality")]
     pub samples: Option<u32>,
     /// Pixel filter: box, triangle or gaussian [default: box]
     #[arg(long, value_name = "FILTER", help_heading = "Quality")]
     pub filter: Option<String>,
     /// Bounces of mirrored and refracted rays [default: 10]
-    #[arg(long, value_name = "N", help_heading = "Quality")]
+    #[arg(long, value_parser = clap::value_parser!(u32).range(whole(&limits::DEPTH)), value_name = "N", help_heading = "Quality")]
     pub depth: Option<u32>,
     /// Seed of the samples [default: 0]
     #[arg(long, value_name = "N", help_heading = "Quality")]

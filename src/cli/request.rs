@@ -41,7 +41,7 @@ fn options(args: &RenderArgs) -> Result<Options> {
             .map(|b| settings::bits(f64::from(b)))
             .transpose()
             .map_err(|e| anyhow!("--bits: {e}"))?,
-        quality: ranged("--quality", args.quality, &limits::QUALITY)?,
+        quality: args.quality,
         camera: None::<CameraChoice>,
         eye: read("--eye", args.eye.as_deref(), settings::vector)?,
         look_at: read("--look-at", args.look_at.as_deref(), settings::vector)?,
@@ -50,9 +50,9 @@ fn options(args: &RenderArgs) -> Result<Options> {
         lights: (!lights.is_empty()).then_some(LightChoice::Given(lights)),
         ambient: read("--ambient", args.ambient.as_deref(), settings::color)?,
         background: read("--background", args.background.as_deref(), settings::background)?,
-        samples: ranged("--samples", args.samples, &limits::SAMPLES)?,
+        samples: args.samples,
         filter: read("--filter", args.filter.as_deref(), |w| one_of(&settings::FILTERS, w))?,
-        depth: ranged("--depth", args.depth, &limits::DEPTH)?,
+        depth: args.depth,
         seed: args.seed,
         exposure: ranged("--exposure", args.exposure, &limits::EXPOSURE)?,
         smooth_angle: ranged("--smooth-angle", args.smooth_angle, &limits::ANGLE)?,

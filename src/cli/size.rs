@@ -1,5 +1,7 @@
 //! Sizes as they are typed: pixels and bytes.
 
+use std::ops::RangeInclusive;
+
 /// `1280x720`, `hd` or `fullhd`.
 pub(super) fn pixels(text: &str) -> Result<[u32; 2], String> {
     match text {
@@ -11,12 +13,17 @@ pub(super) fn pixels(text: &str) -> Result<[u32; 2], String> {
     let side = |s: &str| s.parse::<u32>().ok().filter(|n| (1..=MAX_SIDE).contains(n));
     match (side(w), side(h)) {
         (Some(w), Some(h)) => Ok([w, h]),
-        _ => Err(format!("width and height lie between 1 and {MAX_SIDE}")),
+        _ => Err(format!("is written WxH, both from 1 to {MAX_SIDE}")),
     }
 }
 
 /// Longest side of a picture.
 const MAX_SIDE: u32 = 65_535;
+
+/// A range of whole numbers.
+pub(super) fn whole(range: &RangeInclusive<f64>) -> RangeInclusive<i64> {
+    *range.start() as i64..=*range.end() as i64
+}
 
 /// `512M`, `4G`, `64K` or a number of bytes; powers of 1024.
 pub(super) fn bytes(text: &str) -> Result<u64, String> {

@@ -57,7 +57,7 @@ fn listen() -> Result<OnSignals> {
     std::thread::spawn(move || {
         for s in signals.forever() {
             if s == SIGUSR1 {
-                eprintln!("{}", STATE.lock().unwrap_or_else(PoisonError::into_inner));
+                err!("{}", STATE.lock().unwrap_or_else(PoisonError::into_inner));
                 continue;
             }
             if asked.asked() {

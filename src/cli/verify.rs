@@ -49,7 +49,7 @@ fn tell(verdict: &Verdict, pictures: usize, failed: usize, global: &Global) {
         let line = serde_json::json!({
             "verdict": word, "ways": ways, "pictures": pictures, "failed": failed, "way": way, "what": what,
         });
-        println!("{line}");
+        out!("{line}");
         return;
     }
     match verdict {
@@ -57,9 +57,9 @@ fn tell(verdict: &Verdict, pictures: usize, failed: usize, global: &Global) {
         Verdict::Equal => {
             let and_failed =
                 if failed > 0 { format!("; {failed} failed in every way alike") } else { String::new() };
-            eprintln!("equal: {pictures} pictures, {}{and_failed}", ways.join(", "));
+            err!("equal: {pictures} pictures, {}{and_failed}", ways.join(", "));
         }
-        Verdict::Differs { way, what } => eprintln!("differs: {way}: {what}"),
-        Verdict::Stopped => eprintln!("stopped"),
+        Verdict::Differs { way, what } => err!("differs: {way}: {what}"),
+        Verdict::Stopped => err!("stopped"),
     }
 }

@@ -118,7 +118,7 @@ pub(super) fn watch(args: &WatchArgs, global: &Global) -> Result<ExitCode> {
             stop::keep_state(counts.words());
         }
         if global.json {
-            println!("{}", as_json(event));
+            out!("{}", as_json(event));
         } else {
             tell(event, global);
         }
@@ -160,32 +160,32 @@ impl Counts {
 fn tell(event: &WatchEvent<'_>, global: &Global) {
     match event {
         WatchEvent::Ready(at) if !global.quiet => match at {
-            Some(at) => eprintln!("watching; the status page is at http://{at}/"),
-            None => eprintln!("watching"),
+            Some(at) => err!("watching; the status page is at http://{at}/"),
+            None => err!("watching"),
         },
         WatchEvent::State(status) => {
             let (job, word, frames) = (&status.job, status.state.word(), &status.frames);
             match (status.state, &status.error) {
                 (State::Failed, error) => {
-                    eprintln!("{job}: failed: {}", error.as_deref().unwrap_or("no reason is known"));
+                    err!("{job}: failed: {}", error.as_deref().unwrap_or("no reason is known"));
                 }
                 _ if global.quiet => {}
-                (State::Finished, _) => eprintln!("{job}: finished, {} frames", frames.done),
-                (State::Cancelled, Some(error)) => eprintln!("{job}: cancelled: {error}"),
-                (State::Running | State::Queued, _) => eprintln!("{job}: {word}"),
-                _ if global.verbose => eprintln!("{job}: {word}"),
+                (State::Finished, _) => err!("{job}: finished, {} frames", frames.done),
+                (State::Cancelled, Some(error)) => err!("{job}: cancelled: {error}"),
+                (State::Running | State::Queued, _) => err!("{job}: {word}"),
+                _ if global.verbose => err!("{job}: {word}"),
                 _ => {}
             }
         }
         WatchEvent::Run(job, Event::Frame(frame)) => match &frame.error {
-            Some(error) => eprintln!("{job}: error: {error}"),
-            None if global.verbose => eprintln!("{job}: {}: {:?}", frame.picture, frame.status),
+            Some(error) => err!("{job}: error: {error}"),
+            None if global.verbose => err!("{job}: {}: {:?}", frame.picture, frame.status),
             None => {}
         },
         WatchEvent::Run(job, Event::Warning(warning)) if !global.quiet => {
-            eprintln!("{job}: warning: {warning}");
+            err!("{job}: warning: {warning}");
         }
-        WatchEvent::Note(text) => eprintln!("{text}"),
+        WatchEvent::Note(text) => err!("{text}"),
         _ => {}
     }
 }

@@ -24,7 +24,7 @@ pub struct Wanted {
 #[derive(Debug, thiserror::Error)]
 pub enum RegistryError {
     /// No device has that name.
-    #[error("there is no device {0}; `rentix devices` lists those there are")]
+    #[error("there is no device `{0}`; `rentix devices` lists those there are")]
     Unknown(String),
     /// No GPU is hardware.
     #[error("there is no GPU that is hardware{0}; `rentix devices` lists what there is")]
