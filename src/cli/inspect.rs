@@ -93,8 +93,8 @@ fn look(before: Option<&Frame>, frame: &Frame) -> Seen {
 
 fn tell(job: &Job, picture: &Picture, seen: &Seen, first: bool, global: &Global) {
     let sequence = &job.sequences[picture.sequence];
-    let source = picture.main_file(sequence).map(|f| f.stem.clone()).unwrap_or_default();
     if global.json {
+        let source = picture.main_file(sequence).map(|f| f.stem.clone()).unwrap_or_default();
         let line = serde_json::json!({
             "sequence": sequence.name, "frame": picture.frame, "source": source, "triangles": seen.triangles,
             "vertices": seen.vertices, "meshes": seen.meshes, "materials": seen.materials, "change": seen.change,
@@ -113,8 +113,10 @@ fn tell(job: &Job, picture: &Picture, seen: &Seen, first: bool, global: &Global)
             "materials"
         );
     }
+    // all frames of a glTF are of one file
+    let name = picture.picture.file_stem().unwrap_or_default().to_string_lossy();
     out!(
-        "{source:>24} {:>10} {:>10} {:>7} {:>9}  {}",
+        "{name:>24} {:>10} {:>10} {:>7} {:>9}  {}",
         seen.triangles,
         seen.vertices,
         seen.meshes,

@@ -13,7 +13,12 @@ pub(super) fn store(cache: Option<&Path>) -> Option<Arc<Store>> {
         .or_else(|| set("RENTIX_CACHE"))
         .or_else(|| is_own_checkout().then(|| PathBuf::from("cache")))
         .or_else(|| {
-            Some(set("XDG_CACHE_HOME").or_else(|| Some(set("HOME")?.join(".cache")))?.join("rentix"))
+            Some(
+                set("XDG_CACHE_HOME")
+                    .filter(|p| p.is_absolute())
+                    .or_else(|| Some(set("HOME")?.join(".cache")))?
+                    .join("rentix"),
+            )
         })?;
     Some(Arc::new(Store::new(&root, DEFAULT_LIMIT_BYTES)))
 }

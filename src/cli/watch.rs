@@ -10,7 +10,7 @@ use crate::watch::{self, Notices, State, WatchEvent, WatchOptions};
 use anyhow::{Result, bail};
 use clap::Args;
 use std::collections::HashMap;
-use std::net::SocketAddr;
+use std::net::{SocketAddr, ToSocketAddrs as _};
 use std::process::ExitCode;
 use std::time::Duration;
 
@@ -34,7 +34,7 @@ pub(super) struct WatchArgs {
     #[arg(long, value_name = "N", allow_negative_numbers = true, help_heading = "Watching")]
     pub priority: Option<i64>,
     /// Serve a status page (also /metrics for Prometheus, /healthz), as 127.0.0.1:8080
-    #[arg(long, value_name = "ADDRESS", help_heading = "Watching")]
+    #[arg(long, value_name = "ADDRESS", value_parser = address, help_heading = "Watching")]
     pub listen: Option<SocketAddr>,
     /// Run a command for each job that finished or failed, tried at least once, one at a time (RENTIX_JOB, RENTIX_STATE, RENTIX_FOLDER, RENTIX_FRAMES, RENTIX_FAILED, RENTIX_ERROR; its status on stdin)
     #[arg(long, value_name = "CMD", help_heading = "Watching")]
@@ -208,4 +208,10 @@ fn as_json(event: &WatchEvent<'_>) -> serde_json::Value {
         WatchEvent::Ended(job, outcome) => of(job, end_json(outcome)),
         WatchEvent::Note(text) => serde_json::json!({"event": "note", "text": text}),
     }
+}
+
+/// An address and a port, or a host's name and a port.
+fn address(text: &str) -> Result<SocketAddr, String> {
+    let found = text.to_socket_addrs().map_err(|e| format!("{e}; it is written 127.0.0.1:8080"))?.next();
+    found.ok_or_else(|| "this host has no address".to_string())
 }

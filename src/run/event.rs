@@ -2,9 +2,11 @@
 
 use crate::device::{RayCounts, UpdateCost};
 use crate::diff::Change;
+use crate::format::is_gltf;
 use crate::plan::{Action, UpdatePlan};
 use crate::warning::Warning;
 use serde::Serialize;
+use std::path::Path;
 
 /// How a frame ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
@@ -122,6 +124,14 @@ pub struct FrameReport {
 }
 
 impl FrameReport {
+    /// The frame as errors name it: all frames of a glTF are of one file.
+    pub(super) fn named(&self) -> String {
+        match self.frame {
+            Some(frame) if is_gltf(Path::new(&self.source)) => format!("{}: frame {frame}", self.source),
+            _ => self.source.clone(),
+        }
+    }
+
     /// Fills in what a plan and its execution tell.
     pub fn updated(&mut self, plan: &UpdatePlan, cost: &UpdateCost) {
         self.warm = plan.is_warm();

@@ -185,7 +185,7 @@ impl<'a> Reader<'a> {
     ) -> Result<(), Box<FrameReport>> {
         match self.options.memory_bytes {
             Some(budget_bytes) if needed_bytes > budget_bytes => {
-                report.error = Some(format!("{}: {}", report.source, refusal(needed_bytes, budget_bytes)));
+                report.error = Some(format!("{}: {}", report.named(), refusal(needed_bytes, budget_bytes)));
                 report.device_failed = true;
                 Err(report.clone())
             }
@@ -220,7 +220,7 @@ impl<'a> Reader<'a> {
 
     fn failed(&self, index: usize, error: &str) -> Box<FrameReport> {
         let mut report = self.blank(index);
-        report.error = Some(format!("{}: {error}", report.source));
+        report.error = Some(format!("{}: {error}", report.named()));
         report
     }
 }

@@ -316,7 +316,7 @@ impl DeviceStage<'_> {
         if is_tried_again {
             return self.tell();
         }
-        let source = &read.report.source;
+        let source = read.report.named();
         let error = match failure {
             Failure::Device(error) => {
                 read.report.device_failed = true;
