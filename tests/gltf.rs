@@ -174,6 +174,8 @@ fn a_gltf_file_is_an_input() {
     assert_eq!(pictures(&t.join("pattern"))["mover_0002.png"], made["mover_0002.png"]);
     let said = render(t, &file, "none", &["--clip", "stay"], 2).stderr;
     assert!(said.contains("`stay`") && said.contains("`go`"), "{said}");
+    let said = render(t, &file, "none", &["--fps", "2", "--memory", "1"], 3).stderr;
+    assert!(said.contains("mover.gltf: frame 2: "), "{said}");
     std::fs::write(&file, "{}").unwrap();
     let said = render(t, &file, "none", &[], 2).stderr;
     assert!(said.contains("mover.gltf") && said.contains("export it again"), "{said}");

@@ -288,13 +288,16 @@ pub fn plan_frame(frame: &Frame, residency: &Residency, wishes: &Wishes) -> Upda
     }
 }
 
+/// What a tree takes at most beyond that, be it of one triangle.
+const TREE_BYTES: u64 = 320;
+
 fn needed_bytes(steps: &[Step], residency: &Residency) -> u64 {
     let held_bytes = |name: &PartHash| residency.held.get(name).map_or(0, |held| held.bytes);
     let of_step = |step: &Step| match step {
         Step::Free { .. } | Step::Evict { .. } => 0,
         Step::Keep { name } | Step::Refit { from: name, .. } => held_bytes(name),
         Step::Upload { bytes, .. } => *bytes,
-        Step::Build { triangles, .. } => triangles * TREE_BYTES_PER_TRIANGLE,
+        Step::Build { triangles, .. } => TREE_BYTES + triangles * TREE_BYTES_PER_TRIANGLE,
     };
     steps.iter().map(of_step).sum()
 }
