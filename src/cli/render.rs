@@ -143,8 +143,8 @@ fn conclude(job: &Job, outcome: &Outcome, global: &Global, stop: &stop::OnSignal
         }
         err!("{line} in {:.1} s: {}", outcome.report.wall_s, job.folder.display());
     }
-    if outcome.stopped {
-        let left = job.pictures.len() as u64 - totals.frames + totals.failed;
+    let left = job.pictures.len() as u64 - totals.frames + totals.failed;
+    if outcome.stopped && left > 0 {
         err!("stopped: {left} of {} frames are left; the same command renders them", job.pictures.len());
     } else if !failed.is_empty() {
         err!(
