@@ -27,7 +27,7 @@ use std::sync::Arc;
 pub use error::FormatError;
 pub use gltf::{ClipChoice, Gltf, GltfClips, GltfFrame, GltfOptions, NamedCamera, gltf_clips, is_gltf};
 pub use library::Library;
-pub use mtl::is_mtl_word;
+pub use mtl::{mtl_word_accepts, mtl_word_takes, mtl_words};
 pub use obj::{Parsed, ParsedObj, parse_obj};
 use text::Text;
 pub use texture::{TextureCache, load_picture};

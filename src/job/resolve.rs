@@ -6,8 +6,8 @@ use super::dropped;
 use super::file::{self, JobFile, LayerFile, Outside, Override};
 use super::template::{Fill, fill};
 use super::{
-    FrameFile, FrameSet, Job, JobError, Layer, MAX_FRAMES, Options, Picture, Request, Sequence, Settings,
-    Source, main_file,
+    FrameFile, Job, JobError, Layer, MAX_FRAMES, Options, Picture, Request, Sequence, Settings, Source,
+    main_file, settings,
 };
 use crate::format::ClipChoice;
 use crate::warning::Warnings;
@@ -70,7 +70,7 @@ pub fn resolve(request: &Request) -> Result<Job, JobError> {
     let name = name.unwrap_or_default();
 
     job.place_in_folders();
-    job.choose(job_file.frames.as_ref())?;
+    job.choose(&job_file)?;
     job.inputs.extend(
         job.sequences
             .iter()
@@ -232,6 +232,15 @@ impl Resolving<'_> {
         if !is_dropped {
             options.lay_over(&self.request.options);
         }
+        if let Err(text) = settings::check_bits(&options) {
+            let of_override = applying.iter().rev().find_map(|&i| job.overrides[i].bits_at.as_ref());
+            let place = of_override.or(job.bits_at.as_ref());
+            let is_typed = self.request.options.bits.is_some() && !is_dropped;
+            return Err(match place.filter(|_| !is_typed) {
+                Some(place) => job.wrong(place, format!("bits: {text}")),
+                None => JobError::Options(text),
+            });
+        }
         let mut settings = Settings::new(&options).map_err(JobError::Options)?;
         settings.read.within.clone_from(&self.request.dropped);
         let settings = Arc::new(settings);
@@ -267,13 +276,20 @@ impl Resolving<'_> {
 
     /// `--frames`, else the job's, then `--chunk`, then `--order`. Names are compared before the chunk is taken: all
     /// chunks write into one folder.
-    fn choose(&mut self, of_job: Option<&FrameSet>) -> Result<(), JobError> {
+    fn choose(&mut self, job: &JobFile) -> Result<(), JobError> {
         let typed = self.request.frames.as_ref();
-        if let Some(set) = if self.request.dropped.is_some() { of_job.or(typed) } else { typed.or(of_job) } {
+        let of_job = job.frames.as_ref();
+        let job_wins = of_job.is_some() && (self.request.dropped.is_some() || typed.is_none());
+        if let Some(set) = if job_wins { of_job } else { typed } {
             let mut numbers: Vec<i64> = self.pictures.iter().filter_map(|p| p.frame).collect();
             numbers.sort_unstable();
             if let Some(missing) = set.first_not_in(&numbers).filter(|_| !self.request.grows) {
-                return Err(JobError::NoSuchFrame(missing));
+                let error = JobError::NoSuchFrame(missing);
+                return Err(if job_wins {
+                    job.wrong(&job.frames_at, format!("frames: {error}"))
+                } else {
+                    error
+                });
             }
             self.pictures.retain(|p| p.frame.is_some_and(|f| set.contains(f)));
         }

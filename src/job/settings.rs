@@ -84,10 +84,8 @@ impl Settings {
     /// Fills in what the options leave open.
     pub fn new(options: &Options) -> Result<Self, String> {
         let o = options.clone();
+        check_bits(&o)?;
         let format = o.format.clone().unwrap_or_else(|| FORMATS[0].to_string());
-        if o.bits == Some(16) && !SIXTEEN_BITS.contains(&&*format) && !FLOATS.contains(&&*format) {
-            return Err(format!("{format} has 8 bits a channel; 16 have {}", SIXTEEN_BITS.join(", ")));
-        }
         let read = ReadOptions {
             smooth_angle_deg: o.smooth_angle,
             mtl_srgb: o.mtl_srgb.unwrap_or(false),
@@ -159,6 +157,15 @@ impl Settings {
     pub fn aspect(&self) -> f64 {
         f64::from(self.size[0]) / f64::from(self.size[1])
     }
+}
+
+/// Whether the format has the bits a channel that are asked for.
+pub(super) fn check_bits(o: &Options) -> Result<(), String> {
+    let format = o.format.as_deref().unwrap_or(FORMATS[0]);
+    if o.bits == Some(16) && !SIXTEEN_BITS.contains(&format) && !FLOATS.contains(&format) {
+        return Err(format!("{format} has 8 bits a channel; 16 have {}", SIXTEEN_BITS.join(", ")));
+    }
+    Ok(())
 }
 
 /// The camera with what was given apart from it (`--eye`, `--look-at`, `--up`, `--fov`) laid over.

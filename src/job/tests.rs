@@ -187,6 +187,18 @@ fn wrong_use_is_refused() {
     assert!(error(&t.request(&["a.yaml", "c.yaml"])).contains("more than one job file"));
     assert!(error(&t.request(&["b.yaml"])).contains("b.yaml:2:1: unknown key `sise`"));
     assert!(error(&t.request(&["c.yaml", "w"])).contains("layers"));
+    for (yaml, told) in [
+        ("frames: 9", "f.yaml:2:9: frames: frame 9 "),
+        ("output: {bits: 16, format: jpg}", "f.yaml:2:16: bits: jpg has 8 bits"),
+        ("output: {format: jpg}\noverrides: [{frames: 1, bits: 16}]", "f.yaml:3:31: bits: jpg has 8 bits"),
+    ] {
+        t.write("f.yaml", &format!("sequence: w\n{yaml}\n"));
+        assert!(error(&t.request(&["f.yaml"])).contains(told), "{}", error(&t.request(&["f.yaml"])));
+    }
+    // what is typed is not the job's
+    let typed = Options { bits: Some(16), ..Options::default() };
+    let request = Request { options: typed, ..t.request(&["f.yaml"]) };
+    assert!(error(&request).starts_with("jpg has 8 bits"), "{}", error(&request));
     t.write("e.yaml", "sequence: w\nfilter: \"\\e[31m\"\n");
     assert!(!error(&t.request(&["e.yaml"])).contains('\u{1b}'));
     assert!(error(&t.request(&["d.yaml"])).contains("d.yaml"));

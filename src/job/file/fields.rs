@@ -48,7 +48,7 @@ impl<'a> Fields<'a> {
 }
 
 /// Names the key that an error is about, with those around it: `camera.eye`.
-fn about(key: &str, wrong: Wrong) -> Wrong {
+pub(super) fn about(key: &str, wrong: Wrong) -> Wrong {
     let key = wrong.key.map_or_else(|| key.to_string(), |inner| format!("{key}.{inner}"));
     Wrong { key: Some(key), ..wrong }
 }

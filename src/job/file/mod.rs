@@ -9,28 +9,42 @@ use super::numbers::FrameSet;
 use super::options::{Background, Options, limits};
 use super::pattern::Pattern;
 use super::settings::{self, FILTERS, MTL_COLORS};
+use super::template;
 use super::track::Placed;
 use super::words::one_of;
 use crate::format::ClipChoice;
 use crate::scene::AovSet;
 use fields::{Fields, Read, color, frames, list, number, parsed, text, truth, unexpected, whole};
-use node::{Node, Value, Wrong};
+use node::{Node, Value, Wrong, place_of};
 use std::io::Read as _;
 use std::path::{Path, PathBuf};
 
 /// What a job file says.
 #[derive(Debug, Default)]
 pub(super) struct JobFile {
+    /// The file itself; empty where there is none.
+    path: PathBuf,
     pub(super) name: Option<String>,
     pub(super) sequence: Option<PathBuf>,
     pub(super) layers: Vec<LayerFile>,
     pub(super) frames: Option<FrameSet>,
+    /// Where those stand, as it follows the file's name.
+    pub(super) frames_at: String,
     pub(super) folder: Option<PathBuf>,
     pub(super) priority: Option<i64>,
     pub(super) fps: Option<f64>,
     pub(super) clip: ClipChoice,
     pub(super) options: Options,
+    /// Where `bits` stand.
+    pub(super) bits_at: Option<String>,
     pub(super) overrides: Vec<Override>,
+}
+
+impl JobFile {
+    /// Something wrong at a place in the file that shows only beside what is on the disk or in other keys.
+    pub(super) fn wrong(&self, place: &str, text: String) -> JobError {
+        JobError::File { path: self.path.clone(), place: place.to_string(), text }
+    }
 }
 
 /// One layer as the job file gives it.
@@ -67,6 +81,8 @@ pub(super) struct Override {
     /// On the stem.
     pub(super) files: Option<Pattern>,
     pub(super) options: Options,
+    /// Where its `bits` stand.
+    pub(super) bits_at: Option<String>,
 }
 
 /// No job file is larger.
@@ -131,20 +147,24 @@ fn parse(yaml: &str, said_in: &Path) -> Read<JobFile> {
     }
     let path = |node: &Node| path(node, said_in);
     let mut file = JobFile {
+        path: said_in.to_path_buf(),
         name: job.get("name", plain_name)?,
         sequence: job.get("sequence", path)?,
         layers: job.get("layers", |node| layers(node, said_in))?.unwrap_or_default(),
         frames: job.get("frames", frames)?,
+        frames_at: job.node("frames").map(place_of).unwrap_or_default(),
         priority: job.get("priority", whole(limits::FRAME))?.map(|x| x as i64),
         fps: job.get("fps", number(limits::FPS))?,
         clip: job.get("clip", text)?.map(|word| ClipChoice::from_word(&word)).unwrap_or_default(),
         options: scene_options(&job, said_in)?,
         overrides: job.get("overrides", list(|node| override_of(node, said_in)))?.unwrap_or_default(),
         folder: None,
+        bits_at: None,
     };
     job.get("output", |node| {
         let output = Fields::of(node, &[&["folder"], &PICTURE_KEYS])?;
         file.folder = output.get("folder", path)?;
+        file.bits_at = output.node("bits").map(place_of);
         picture_options(&output, &mut file.options)
     })?;
     Ok(file)
@@ -190,7 +210,7 @@ fn scene_options(map: &Fields<'_>, said_in: &Path) -> Read<Options> {
 }
 
 fn picture_options(map: &Fields<'_>, options: &mut Options) -> Read<()> {
-    options.name = map.get("name", text)?;
+    options.name = map.get("name", picture_name)?;
     options.format = map.get("format", parsed(settings::format_word))?;
     options.size = map.get("size", size)?;
     options.alpha = map.get("alpha", truth)?;
@@ -200,6 +220,13 @@ fn picture_options(map: &Fields<'_>, options: &mut Options) -> Read<()> {
     })?;
     options.quality = map.get("quality", whole(limits::QUALITY))?.map(|x| x as u8);
     Ok(())
+}
+
+/// A template of pictures' names.
+fn picture_name(node: &Node) -> Read<String> {
+    let name = text(node)?;
+    template::check(&name).map_err(|e| Wrong::at(node, e))?;
+    Ok(name)
 }
 
 fn size(node: &Node) -> Read<[u32; 2]> {
@@ -231,7 +258,8 @@ fn override_of(node: &Node, said_in: &Path) -> Read<Override> {
     let map = Fields::of(node, &[&["frames", "files"], &SCENE_KEYS, &PICTURE_KEYS])?;
     let mut options = scene_options(&map, said_in)?;
     picture_options(&map, &mut options)?;
-    Ok(Override { frames: map.get("frames", frames)?, files: map.get("files", pattern)?, options })
+    let bits_at = map.node("bits").map(place_of);
+    Ok(Override { frames: map.get("frames", frames)?, files: map.get("files", pattern)?, options, bits_at })
 }
 
 fn pattern(node: &Node) -> Read<Pattern> {

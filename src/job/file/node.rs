@@ -36,6 +36,11 @@ impl Wrong {
     }
 }
 
+/// Where a value stands, as it follows a file's name: `:LINE:COLUMN`.
+pub(super) fn place_of(node: &Node) -> String {
+    format!(":{}:{}", node.referenced.line(), node.referenced.column())
+}
+
 impl fmt::Display for Wrong {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         if let Some(key) = &self.key {

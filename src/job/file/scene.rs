@@ -1,20 +1,27 @@
 //! What the job file says of cameras, lights, materials and transforms.
 
 use super::fields::{
-    Fields, Read, color, direction, elements, entries, list, number, parsed, text, triple, vector, whole,
+    Fields, Read, about, color, direction, elements, entries, list, number, parsed, text, triple, unexpected,
+    vector, whole,
 };
 use super::node::{Node, Value, Wrong};
-use crate::format::{MaterialOverride, is_mtl_word};
+use crate::format::{MaterialOverride, mtl_word_accepts, mtl_word_takes, mtl_words};
 use crate::job::options::{CameraChoice, LightChoice, Options, limits};
 use crate::job::settings::{FALLOFFS, INTERPOLATIONS, up_word};
 use crate::job::track::{CameraPose, CameraTrack, Key, Placed, Transform};
-use crate::job::words::one_of;
+use crate::job::words::{listed, nearest, one_of};
 use crate::math::{DVec3, Vec3};
 use crate::scene::{Falloff, Light};
 use std::path::Path;
 
 fn is_auto(node: &Node) -> bool {
     matches!(&node.value, Value::Text(text) if text == "auto")
+}
+
+/// ` (did you mean `auto`?)` where a word is near.
+fn or_auto(node: &Node) -> String {
+    let Value::Text(word) = &node.value else { return String::new() };
+    nearest(word, std::iter::once("auto"))
 }
 
 /// What is up: a word or three numbers.
@@ -24,8 +31,10 @@ pub(super) fn up(node: &Node) -> Read<DVec3> {
 
 /// `auto`, a camera, keys of a camera, or what is to be changed of the auto camera.
 pub(super) fn camera(node: &Node, options: &mut Options) -> Read<CameraChoice> {
-    if is_auto(node) {
-        return Ok(CameraChoice::Auto);
+    match node.value {
+        _ if is_auto(node) => return Ok(CameraChoice::Auto),
+        Value::Map(_) => {}
+        _ => return Err(unexpected(node, &format!("`auto` or a map{}", or_auto(node)))),
     }
     let map = Fields::of(node, &[&["eye", "look_at", "up", "fov", "keys", "interpolate", "gltf"]])?;
     if let Some(gltf) = map.node("gltf") {
@@ -114,7 +123,11 @@ pub(super) fn placed(node: &Node) -> Read<Placed> {
 
 /// `auto`, or a list of lights.
 pub(super) fn lights(node: &Node) -> Read<LightChoice> {
-    if is_auto(node) { Ok(LightChoice::Auto) } else { list(light)(node).map(LightChoice::Given) }
+    match node.value {
+        _ if is_auto(node) => Ok(LightChoice::Auto),
+        Value::List(_) => list(light)(node).map(LightChoice::Given),
+        _ => Err(unexpected(node, &format!("`auto`, or a list of lights, [] for none{}", or_auto(node)))),
+    }
 }
 
 fn light(node: &Node) -> Read<Light> {
@@ -182,18 +195,37 @@ fn area(node: &Node) -> Read<Light> {
 pub(super) fn materials(node: &Node, said_in: &Path) -> Read<Vec<MaterialOverride>> {
     let mut materials = Vec::new();
     for (name, node) in entries(node)? {
-        let mut words = Vec::new();
-        for (word, node) in entries(node)? {
-            if !is_mtl_word(&word.value) {
-                let text = format!("material {}: `{}` is not a word of an MTL", name.value, word.value);
-                return Err(Wrong::at(word, text));
-            }
-            words.push((word.value.clone(), behind(node)?));
-        }
+        let words = statements(&name.value, node).map_err(|wrong| about(&name.value, wrong))?;
         let name = name.value.clone().into_bytes();
         materials.push(MaterialOverride { name, words, said_in: said_in.to_path_buf() });
     }
     Ok(materials)
+}
+
+/// The words for one material, each with a value that it takes.
+fn statements(name: &str, node: &Node) -> Read<Vec<(String, String)>> {
+    let mut words = Vec::new();
+    for (word, node) in entries(node)? {
+        let Some(wanted) = mtl_word_takes(&word.value) else {
+            let hint = nearest(&word.value, mtl_words());
+            let allowed = listed(mtl_words());
+            let text = format!(
+                "material {name}: `{}` is not a word of an MTL{hint}; allowed: {allowed}",
+                word.value
+            );
+            return Err(Wrong::at(word, text));
+        };
+        let about_word = |wrong| about(&word.value, wrong);
+        let value = match node.value {
+            Value::Number(_) | Value::Text(_) | Value::List(_) => behind(node).map_err(about_word)?,
+            _ => return Err(about_word(unexpected(node, &wanted))),
+        };
+        if !mtl_word_accepts(&word.value, &value) {
+            return Err(about_word(unexpected(node, &wanted)));
+        }
+        words.push((word.value.clone(), value));
+    }
+    Ok(words)
 }
 
 /// A number, text, or a list of them, as an MTL has it behind a word.
