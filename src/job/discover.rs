@@ -180,6 +180,7 @@ fn check_numbers(
         return Err(JobError::TwoOfANumber { number: numbers[i], first: name(i), second: name(i + 1) });
     }
     // a simulation that writes every tenth step has no gaps; two numbers are not enough to tell
+    let numbers: Vec<i128> = numbers.into_iter().map(i128::from).collect();
     let step = numbers.windows(2).fold(0, |step, w| gcd(step, w[1] - w[0]));
     let step = if numbers.len() > 2 { step } else { 1 };
     let gaps: Vec<String> = numbers
@@ -203,7 +204,7 @@ fn check_numbers(
     Ok(())
 }
 
-fn gcd(a: i64, b: i64) -> i64 {
+fn gcd(a: i128, b: i128) -> i128 {
     if b == 0 { a } else { gcd(b, a % b) }
 }
 
@@ -255,6 +256,9 @@ mod tests {
             discover(folder(&["w_1.obj", "w_3.obj"]).path(), strict, &mut warnings),
             Err(JobError::Gaps { .. })
         ));
+        // numbers as far apart as may be
+        let t2 = folder(&["w_-9223372036854775808.obj", "w_0.obj", "w_9223372036854775807.obj"]);
+        assert!(discover(t2.path(), TAKING, &mut Warnings::default()).is_ok());
         let every_tenth = folder(&["w_10.obj", "w_20.obj", "w_30.obj"]);
         assert!(discover(every_tenth.path(), strict, &mut warnings).is_ok());
         let t = folder(&["w_7.obj", "w_0007.obj", "w_8.obj"]);

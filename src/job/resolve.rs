@@ -183,8 +183,8 @@ impl Resolving<'_> {
                 .enumerate()
                 .map(|(layer, (l, given))| Source {
                     layer,
-                    file: layer_file(&l.files, given, frame - first),
-                    transform: l.placed.as_ref().map(|p| p.at(frame as f64)),
+                    file: layer_file(&l.files, given, i128::from(frame) - i128::from(first)),
+                    transform: l.placed.as_ref().map(|p| p.at(frame)),
                 })
                 .collect();
             let shown = sources.iter().zip(&layers).filter_map(|(s, l)| Some(l.files[s.file?].stem.as_str()));
@@ -328,10 +328,11 @@ fn layer_frames(layers: &[Layer], job: &JobFile) -> Vec<i64> {
 
 /// The file that a layer shows so many frames after the job's first one (CONTRACT 3: start + step · offset, in a gap
 /// the last one before).
-fn layer_file(files: &[FrameFile], given: &LayerFile, offset: i64) -> Option<usize> {
-    let number = |f: &FrameFile| f.number.unwrap_or(0);
+fn layer_file(files: &[FrameFile], given: &LayerFile, offset: i128) -> Option<usize> {
+    let number = |f: &FrameFile| i128::from(f.number.unwrap_or(0));
     let (first, last) = (number(files.first()?), number(files.last()?));
-    let mut wanted = given.start.unwrap_or(first).saturating_add(given.step.saturating_mul(offset));
+    let steps = i128::from(given.step).saturating_mul(offset);
+    let mut wanted = given.start.map_or(first, i128::from).saturating_add(steps);
     if !(first..=last).contains(&wanted) {
         wanted = match given.outside {
             Outside::Hold => wanted.clamp(first, last),

@@ -149,7 +149,7 @@ impl Settings {
     pub fn camera_at(&self, frame: Option<i64>) -> Option<Camera> {
         match &self.camera {
             CameraChoice::Auto | CameraChoice::Gltf { .. } => None,
-            CameraChoice::Given(track) => track.at(frame.unwrap_or(0) as f64, self.up, self.fov_deg),
+            CameraChoice::Given(track) => track.at(frame.unwrap_or(0), self.up, self.fov_deg),
         }
     }
 
@@ -179,7 +179,7 @@ fn camera(o: &Options) -> Result<CameraChoice, String> {
             (None, None) => return Ok(CameraChoice::Auto),
             (Some(eye), Some(look_at)) => {
                 let value = CameraPose { eye, look_at, up: None, fov_deg: None };
-                let keys = vec![Key { frame: 0.0, value }];
+                let keys = vec![Key { frame: 0, value }];
                 choice = CameraChoice::Given(CameraTrack { keys, interpolation: Interpolation::Linear });
             }
             (Some(_), None) => return Err("--eye needs --look-at beside it".to_string()),
@@ -318,7 +318,7 @@ mod tests {
     fn a_camera_from_the_command_line_is_laid_over_that_of_the_job() {
         let pose = CameraPose { eye: DVec3::X, look_at: DVec3::ZERO, up: None, fov_deg: Some(30.0) };
         let track =
-            CameraTrack { keys: vec![Key { frame: 0.0, value: pose }], interpolation: Interpolation::Linear };
+            CameraTrack { keys: vec![Key { frame: 0, value: pose }], interpolation: Interpolation::Linear };
         let o =
             Options { camera: Some(CameraChoice::Given(track)), eye: Some(DVec3::Y), ..Options::default() };
         let camera = Settings::new(&o).unwrap().camera_at(Some(3)).unwrap();

@@ -166,6 +166,25 @@ overrides:
     assert_eq!(resolve(&t.request(&["j.yaml"])).unwrap().pictures.len(), 3);
 }
 
+#[test]
+fn files_named_by_their_time_are_frames() {
+    let t = Folder::with(&["w/s_20240101123045122.obj", "w/s_20240101123045123.obj"]);
+    t.write(
+        "j.yaml",
+        "layers: [{sequence: w, frames: {start: 20240101123045123}}]\nframes: 20240101123045121\n",
+    );
+    let job = resolve(&t.request(&["j.yaml"])).unwrap();
+    assert_eq!(pictures(&job), ["j_20240101123045121.png"]);
+    assert_eq!(job.pictures[0].sources[0].file, Some(1));
+    let typed = |frames: &str| Request { frames: Some(frames.parse().unwrap()), ..t.request(&["w"]) };
+    assert_eq!(pictures(&resolve(&typed("20240101123045123")).unwrap()), ["s_20240101123045123.png"]);
+    assert!(error(&typed("20240101123045124")).contains("frame 20240101123045124 "));
+    // the ends of 64 bits
+    let t = Folder::with(&["w/a_-9223372036854775808.obj", "w/a_9223372036854775807.obj"]);
+    t.write("j.yaml", "layers: [{sequence: w, frames: {step: -9223372036854775808, outside: loop}}]\n");
+    assert_eq!(resolve(&t.request(&["j.yaml"])).unwrap().pictures.len(), 2);
+}
+
 #[cfg(target_os = "linux")]
 #[test]
 fn names_may_be_any_bytes() {

@@ -14,7 +14,7 @@ use super::track::Placed;
 use super::words::one_of;
 use crate::format::ClipChoice;
 use crate::scene::AovSet;
-use fields::{Fields, Read, color, frames, list, number, parsed, text, truth, unexpected, whole};
+use fields::{Fields, Read, color, frames, integer, list, number, parsed, text, truth, unexpected, whole};
 use node::{Node, Value, Wrong, place_of};
 use std::io::Read as _;
 use std::path::{Path, PathBuf};
@@ -153,7 +153,7 @@ fn parse(yaml: &str, said_in: &Path) -> Read<JobFile> {
         layers: job.get("layers", |node| layers(node, said_in))?.unwrap_or_default(),
         frames: job.get("frames", frames)?,
         frames_at: job.node("frames").map(place_of).unwrap_or_default(),
-        priority: job.get("priority", whole(limits::FRAME))?.map(|x| x as i64),
+        priority: job.get("priority", integer)?,
         fps: job.get("fps", number(limits::FPS))?,
         clip: job.get("clip", text)?.map(|word| ClipChoice::from_word(&word)).unwrap_or_default(),
         options: scene_options(&job, said_in)?,
@@ -240,7 +240,7 @@ fn size(node: &Node) -> Read<[u32; 2]> {
 fn background(node: &Node, said_in: &Path) -> Read<Background> {
     match node.value {
         Value::Text(_) => path(node, said_in).map(Background::File),
-        Value::Number(_) | Value::List(_) => color(node).map(Background::Color),
+        Value::Number(_) | Value::Long(_) | Value::List(_) => color(node).map(Background::Color),
         _ => Err(unexpected(node, "a colour, as [0, 0, 0], or a picture's file, as sky.hdr")),
     }
 }
@@ -288,7 +288,7 @@ fn layer(node: &Node, said_in: &Path) -> Read<LayerFile> {
     };
     map.get("frames", |node| {
         let map = Fields::of(node, &[&["start", "step", "outside"]])?;
-        layer.start = map.get("start", whole(limits::FRAME))?.map(|x| x as i64);
+        layer.start = map.get("start", integer)?;
         layer.step = map.get("step", step)?.unwrap_or(1);
         layer.outside = map.get("outside", parsed(|w| one_of(&OUTSIDES, w)))?.unwrap_or_default();
         Ok(())
@@ -297,7 +297,7 @@ fn layer(node: &Node, said_in: &Path) -> Read<LayerFile> {
 }
 
 fn step(node: &Node) -> Read<i64> {
-    match whole(limits::FRAME)(node)? as i64 {
+    match integer(node)? {
         0 => Err(Wrong::at(node, "a step of 0 never leaves the first frame; leave it out or give another")),
         step => Ok(step),
     }

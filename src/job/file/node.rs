@@ -13,9 +13,22 @@ pub(super) enum Value {
     Null,
     Bool(bool),
     Number(f64),
+    /// A whole number that f64 may not hold.
+    Long(i64),
     Text(String),
     List(Vec<Node>),
     Map(Vec<(Spanned<String>, Node)>),
+}
+
+impl Value {
+    /// The number nearest to a number.
+    pub(super) fn number(&self) -> Option<f64> {
+        match *self {
+            Self::Number(x) => Some(x),
+            Self::Long(x) => Some(x as f64),
+            _ => None,
+        }
+    }
 }
 
 /// What is wrong, and where: line and column from 1.
@@ -86,6 +99,9 @@ impl<'de> Deserialize<'de> for Value {
 
 struct AnyValue;
 
+/// All whole numbers up to this are f64.
+const EXACT: u64 = 1 << 53;
+
 impl<'de> Visitor<'de> for AnyValue {
     type Value = Value;
 
@@ -102,11 +118,12 @@ impl<'de> Visitor<'de> for AnyValue {
     }
 
     fn visit_i64<E>(self, x: i64) -> Result<Value, E> {
-        Ok(Value::Number(x as f64))
+        Ok(if x.unsigned_abs() <= EXACT { Value::Number(x as f64) } else { Value::Long(x) })
     }
 
     fn visit_u64<E>(self, x: u64) -> Result<Value, E> {
-        Ok(Value::Number(x as f64))
+        let is_exact = x <= EXACT;
+        Ok(i64::try_from(x).ok().filter(|_| !is_exact).map_or(Value::Number(x as f64), Value::Long))
     }
 
     fn visit_f64<E>(self, x: f64) -> Result<Value, E> {
@@ -140,6 +157,7 @@ impl fmt::Display for Value {
             Self::Null => f.write_str("nothing"),
             Self::Bool(x) => write!(f, "{x}"),
             Self::Number(x) => write!(f, "the number {x}"),
+            Self::Long(x) => write!(f, "the number {x}"),
             Self::Text(x) => write!(f, "the text `{x}`"),
             Self::List(list) => write!(f, "a list of {}", list.len()),
             Self::Map(_) => f.write_str("a map"),

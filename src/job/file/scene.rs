@@ -1,8 +1,8 @@
 //! What the job file says of cameras, lights, materials and transforms.
 
 use super::fields::{
-    Fields, Read, about, color, direction, elements, entries, list, number, parsed, text, triple, unexpected,
-    vector, whole,
+    Fields, Read, about, color, direction, elements, entries, integer, list, number, parsed, text, triple,
+    unexpected, vector, whole,
 };
 use super::node::{Node, Value, Wrong};
 use crate::format::{MaterialOverride, mtl_word_accepts, mtl_word_takes, mtl_words};
@@ -55,7 +55,7 @@ pub(super) fn camera(node: &Node, options: &mut Options) -> Read<CameraChoice> {
             return Err(Wrong::at(node, "a camera with keys has eye and look_at in the keys"));
         }
         Some(_) => map.need("keys", |node| keys(node, &["eye", "look_at", "up", "fov"], pose))?,
-        None if is_placed => vec![Key { frame: 0.0, value: pose(&map, node)? }],
+        None if is_placed => vec![Key { frame: 0, value: pose(&map, node)? }],
         None => {
             options.up = up.or(options.up);
             options.fov = fov_deg.or(options.fov);
@@ -86,7 +86,7 @@ fn keys<T>(node: &Node, known: &[&str], read: impl Fn(&Fields<'_>, &Node) -> Rea
     let mut keys: Vec<Key<T>> = Vec::new();
     for node in elements(node)? {
         let map = Fields::of(node, &[&["frame"], known])?;
-        let frame = map.need("frame", whole(limits::FRAME))?;
+        let frame = map.need("frame", integer)?;
         if keys.iter().any(|k| k.frame == frame) {
             return Err(Wrong::at(node, format!("there is another key at frame {frame}; remove one")));
         }
@@ -95,7 +95,7 @@ fn keys<T>(node: &Node, known: &[&str], read: impl Fn(&Fields<'_>, &Node) -> Rea
     if keys.is_empty() {
         return Err(Wrong::at(node, "the list of keys is empty"));
     }
-    keys.sort_by(|a, b| a.frame.total_cmp(&b.frame));
+    keys.sort_by_key(|key| key.frame);
     Ok(keys)
 }
 
@@ -111,7 +111,7 @@ pub(super) fn placed(node: &Node) -> Read<Placed> {
         })
     };
     let keys = match map.get("keys", |node| keys(node, &PARTS, transform))? {
-        None => vec![Key { frame: 0.0, value: transform(&map, node)? }],
+        None => vec![Key { frame: 0, value: transform(&map, node)? }],
         Some(_) if PARTS.iter().any(|part| map.node(part).is_some()) => {
             let text = "a transform with keys has translate, rotate and scale in the keys";
             return Err(Wrong::at(node, text));
@@ -217,7 +217,9 @@ fn statements(name: &str, node: &Node) -> Read<Vec<(String, String)>> {
         };
         let about_word = |wrong| about(&word.value, wrong);
         let value = match node.value {
-            Value::Number(_) | Value::Text(_) | Value::List(_) => behind(node).map_err(about_word)?,
+            Value::Number(_) | Value::Long(_) | Value::Text(_) | Value::List(_) => {
+                behind(node).map_err(about_word)?
+            }
             _ => return Err(about_word(unexpected(node, &wanted))),
         };
         if !mtl_word_accepts(&word.value, &value) {
@@ -231,7 +233,7 @@ fn statements(name: &str, node: &Node) -> Read<Vec<(String, String)>> {
 /// A number, text, or a list of them, as an MTL has it behind a word.
 fn behind(node: &Node) -> Read<String> {
     match &node.value {
-        Value::Number(_) => Ok(number(limits::NUMBER)(node)?.to_string()),
+        Value::Number(_) | Value::Long(_) => Ok(number(limits::NUMBER)(node)?.to_string()),
         Value::List(_) => Ok(list(behind)(node)?.join(" ")),
         _ => text(node),
     }
