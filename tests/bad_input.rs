@@ -99,7 +99,7 @@ fn one_line(bytes: usize) {
         ("mtllib ", "a "),
         ("", "\\\n"),
         ("l", " 1 2"),
-        ("unknown", "\0"),
+        ("unknown", "\u{1}"),
     ] {
         rendered_text(&format!("{TRIANGLE}f 1 2 3\n{start}{}", filling.repeat(bytes / filling.len())));
     }
@@ -188,6 +188,26 @@ fn a_frame_that_cannot_be_read_fails_alone() {
     let names: Vec<String> = pictures(&store.path().join("out")).into_keys().collect();
     assert_eq!(names, ["a_1.png", "a_5.png"], "{}", run.stderr);
     assert!(run.stderr.contains("a_4.obj:4: position index 4"), "{}", run.stderr);
+}
+
+#[test]
+fn files_that_are_something_else_fail_alone_and_move_no_camera() {
+    let store = tempfile::tempdir().unwrap();
+    let folder = store.path().join("walk");
+    fs::create_dir(&folder).unwrap();
+    fs::write(folder.join("a_1.obj"), format!("{TRIANGLE}f 1 2 3\n")).unwrap();
+    let run = render(store.path(), &folder, "alone", &SIZE, 0);
+    assert!(!run.stderr.contains("warning"), "{}", run.stderr);
+    fs::write(folder.join("a_2.obj"), "\u{1}\0\0\nv 900 0 0\nv 0 900 0\n").unwrap();
+    fs::write(folder.join("a_3.obj"), "<html>\n<p>gone</p>\n</html>\n").unwrap();
+    let run = render(store.path(), &folder, "out", &SIZE, 1);
+    for told in ["a_2.obj:1: is binary, not text", "a_3.obj:1: is no OBJ", "the first is `<html>`"] {
+        assert!(run.stderr.contains(told), "{told}: {}", run.stderr);
+    }
+    assert_eq!(pictures(&store.path().join("out")), pictures(&store.path().join("alone")));
+    let inspected = common::run(store.path(), ["inspect", folder.to_str().unwrap(), "--device", "cpu"]);
+    assert!(inspected.status == 1 && inspected.stdout.contains("a_1"), "{}", inspected.stderr);
+    assert!(inspected.stderr.contains("a_2.obj:1: ") && inspected.stderr.contains("a_3.obj:1: "));
 }
 
 #[cfg(unix)]

@@ -43,6 +43,24 @@ pub enum FormatError {
         /// The file.
         path: PathBuf,
     },
+    /// An OBJ with a zero byte.
+    #[error("{}:{line}: is binary, not text; the frame is not rendered (export it again, or name an OBJ file)", path.display())]
+    Binary {
+        /// The file.
+        path: PathBuf,
+        /// Line of the first zero byte, from 1.
+        line: u32,
+    },
+    /// An OBJ in which nothing is a statement of one.
+    #[error("{}:{line}: is no OBJ: none of its lines is a statement of one, the first is `{statement}`; the frame is not rendered (export it again, or name an OBJ file)", path.display())]
+    NoObj {
+        /// The file.
+        path: PathBuf,
+        /// Line of the first statement, from 1.
+        line: u32,
+        /// That line, shortened.
+        statement: String,
+    },
     /// A picture that is broken, too large or of no known format.
     #[error("{}: {cause}", path.display())]
     BadPicture {

@@ -5,7 +5,7 @@ use super::error::FormatError;
 use super::lookup::Lookup;
 use super::material::{FoundMap, material};
 use super::mtl::{self, Given};
-use super::text::{self, Tally, Text, is_blank, shown};
+use super::text::{self, Tally, Text, is_blank, shown, shown_statement};
 use super::texture::{TextureCache, TextureUse};
 use super::{MaterialOverride, ReadOptions};
 use crate::scene::{Material, Part};
@@ -193,7 +193,7 @@ impl<'a> Loader<'a> {
             (&parsed.unknown, "unknown statements are skipped"),
             (&parsed.malformed, "statements whose value is not understood are skipped"),
         ] {
-            warn(skipped.tally, format!("{what}, the first is `{}`", shown(&skipped.word)));
+            warn(skipped.tally, format!("{what}, the first is `{}`", shown_statement(&skipped.word)));
         }
         warn(parsed.idle.tally, idle_text(&parsed.idle.words));
         let entry = |given| Entry { given, file: Some(path.to_path_buf()), ..Entry::default() };

@@ -212,8 +212,15 @@ pub fn check_obj(path: &Path) -> Result<(), FormatError> {
 
 /// The box of the positions in an OBJ that are finite, as [`load_obj`] gives them; empty where there is none.
 pub fn scan_bounds(path: &Path) -> Result<Bounds, FormatError> {
-    let mut bounds = Bounds::EMPTY;
-    text::read_pieces(path, |text| obj::add_to_bounds(&mut bounds, text))?;
+    let (mut bounds, mut is_binary) = (Bounds::EMPTY, false);
+    text::read_pieces(path, |text| {
+        is_binary |= text.first_zero.is_some();
+        obj::add_to_bounds(&mut bounds, text);
+    })?;
+    if is_binary {
+        // tells the line, which no piece knows
+        check_obj(path)?;
+    }
     Ok(bounds)
 }
 

@@ -14,7 +14,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 /// Another name for each form in which boxes are kept, or in which they are found.
-const STORED: &str = "boxes-1";
+const STORED: &str = "boxes-2";
 /// Below so many bytes files are scanned in less than a millisecond.
 const LEAST_STORED_BYTES: u64 = 1 << 20;
 

@@ -2,7 +2,7 @@
 
 use super::scan::{FaceList, Scan, face_offset, face_words, position_offset};
 use crate::format::error::FormatError;
-use crate::format::text::{Text, shown};
+use crate::format::text::{Text, shown_statement};
 use crate::scene::ABSENT;
 use crate::warning::Warnings;
 use std::path::Path;
@@ -68,9 +68,12 @@ fn without_position(word: &[u8], vertices: usize) -> String {
     let whole = word.split(|&b| b == b'/').count() <= 3
         && !digits.is_empty()
         && word.iter().all(|b| b.is_ascii_digit() || matches!(b, b'/' | b'-' | b'+'));
-    let index = shown(index);
+    let index = shown_statement(index);
     if !whole {
-        format!("`{}` is no corner (position, position/texcoord, position//normal or all three)", shown(word))
+        format!(
+            "`{}` is no corner (position, position/texcoord, position//normal or all three)",
+            shown_statement(word)
+        )
     } else if digits.iter().all(|&b| b == b'0') {
         format!("position index {index} is not one: they count from 1, or back from -1")
     } else if index.starts_with('-') {

@@ -19,7 +19,9 @@ mod triangulate;
 use super::ReadOptions;
 use super::error::FormatError;
 use super::library::Library;
-use super::text::{Tally, Text, first_word, is_line_end, line_end, shown, trimmed, without_comment};
+use super::text::{
+    Tally, Text, first_word, is_line_end, line_end, shown, shown_statement, trimmed, without_comment,
+};
 use crate::math::{Bounds, DVec3};
 use crate::scene::Geometry;
 use crate::warning::Warnings;
@@ -119,12 +121,17 @@ impl<'a> Lines<'a> {
         before: Option<&'a Parsed>,
         warnings: &mut Warnings,
     ) -> Result<Self, FormatError> {
+        if let Some(zero) = text.first_zero {
+            return Err(FormatError::Binary { path: path.to_path_buf(), line: text.line_at(zero) });
+        }
         let scan_again = |parsed| again::scan_again(&text.joined, parsed).map(|scan| (scan, parsed));
         let again = before.filter(|_| text.is_plain()).and_then(scan_again);
         let mut lines = if let Some((scan, before)) = again {
             Self { scan, text, path, before: Some(before), all_usable: true }
         } else {
             let mut scan = scan::scan(&text.joined);
+            // what has the faces of the frame before is an OBJ
+            refuse_something_else(&scan, text, path)?;
             check::check_faces(&mut scan, text, path, lenient, warnings)?;
             Self { scan, text, path, before: None, all_usable: false }
         };
@@ -186,7 +193,8 @@ impl<'a> Lines<'a> {
         self.warn(warnings, odd.malformed, "a vertex has a malformed or missing number; faces cannot use it");
         self.warn(warnings, odd.short_faces, "a face has fewer than 3 corners and is dropped");
         self.warn(warnings, odd.unrendered, "points, lines, curves and surfaces are not rendered");
-        let unknown = format!("unknown statements are skipped, the first is `{}`", shown(odd.unknown_word));
+        let unknown =
+            format!("unknown statements are skipped, the first is `{}`", shown_statement(odd.unknown_word));
         self.warn(warnings, odd.unknown, unknown);
         let many = triangulate::MAX_EAR_CORNERS;
         let counts = self.before.map_or(&self.scan.faces.counts, |before| &before.geometry.faces.counts);
@@ -216,6 +224,19 @@ impl<'a> Lines<'a> {
         }
         refused.iter().all(|&(_, count)| count == 0)
     }
+}
+
+fn refuse_something_else(scan: &Scan, text: &Text, path: &Path) -> Result<(), FormatError> {
+    if !scan.is_something_else() {
+        return Ok(());
+    }
+    let start = scan.oddities.unknown.first;
+    let line = &text.joined[start..line_end(&text.joined, start)];
+    Err(FormatError::NoObj {
+        path: path.to_path_buf(),
+        line: text.line_at(start),
+        statement: shown_statement(trimmed(line)),
+    })
 }
 
 fn warn_of_unknown(used: &UsedMaterials, library: &Library, path: &Path, warnings: &mut Warnings) {

@@ -18,7 +18,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 /// Another name for each form in which OBJs are kept, or in which they are read.
-const KIND: &str = "obj-1";
+const KIND: &str = "obj-2";
 
 /// How many lists an entry has.
 const LISTS: usize = 18;

@@ -157,6 +157,24 @@ fn indices_of_attributes_that_are_not_there_count_as_absent() {
 }
 
 #[test]
+fn what_is_something_else_is_refused() {
+    let refused = |bytes: &[u8]| parse(bytes, true).0.err();
+    assert_eq!(
+        refused(b"# a\n\nsolid cube # of steel\nfacet normal 0 0 1\n").unwrap(),
+        "a.obj:3: is no OBJ: none of its lines is a statement of one, the first is `solid cube # of steel`; the frame is not rendered (export it again, or name an OBJ file)"
+    );
+    assert!(refused(b"\x1f\x8b\x08\0\0abc").unwrap().starts_with("a.obj:1: is binary, not text"));
+    assert!(refused(b"v 0 0 0\n# \0\n").unwrap().starts_with("a.obj:2: is binary"));
+    // one statement of the format, whatever it does, and the others are left out
+    for known in ["v 1 2 3", "v", "vt x", "f 1", "g a", "s off", "mtllib a", "usemtl b", "o", "p 1", "end"] {
+        assert_eq!(refused(format!("ny 1\n{known}\n").as_bytes()), None, "{known}");
+    }
+    for nothing in ["", "\n \t\n", "# v\n#\n"] {
+        assert_eq!(refused(nothing.as_bytes()), None, "{nothing:?}");
+    }
+}
+
+#[test]
 fn what_is_left_out_is_counted() {
     let warning = |lines: &str| odd(format!("{SQUARE}{lines}")).1;
     assert_eq!(
