@@ -175,10 +175,16 @@ impl Given {
                 if !matches!(slot, MapSlot::Bump | MapSlot::Norm) && map.bump_multiplier.take().is_some() {
                     map.has_idle("-bm");
                 }
+                if map.channel.is_some() && !matches!(slot, MapSlot::Ns | MapSlot::D | MapSlot::Bump) {
+                    map.has_idle("-imfchan");
+                }
                 return Ok(self.set_map(slot, map));
             }
             Takes::Reflection => {
-                let map = MapStatement::parse(value).ok_or(Refusal::Malformed)?;
+                let mut map = MapStatement::parse(value).ok_or(Refusal::Malformed)?;
+                if map.channel.is_some() {
+                    map.has_idle("-imfchan");
+                }
                 return Ok(self.set_map(MapSlot::Refl(map.side.unwrap_or(Side::Sphere)), map));
             }
             Takes::Idle => return Ok(vec![known]),
@@ -333,6 +339,13 @@ mod tests {
         assert_eq!(idle("map_kd", "-blendu on -type sphere -bm 2 a.png"), ["-blendu", "-type", "-bm"]);
         assert!(idle("map_bump", "-bm 2 a.png").is_empty() && idle("sharpness", "60").is_empty());
         assert!(idle("refl", "-type sphere a.png").is_empty());
+        // a channel is of maps that are one number
+        for word in ["map_Ka", "map_Kd", "map_Ks", "map_Ke", "norm", "refl"] {
+            assert_eq!(idle(word, "-imfchan r a.png"), ["-imfchan"], "{word}");
+        }
+        for word in ["map_d", "map_Ns", "bump"] {
+            assert!(idle(word, "-imfchan r a.png").is_empty(), "{word}");
+        }
     }
 
     #[test]
