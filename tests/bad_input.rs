@@ -48,6 +48,34 @@ fn with_strict_what_is_missing_fails_the_frame() {
     }
 }
 
+#[test]
+fn with_strict_what_is_missing_is_told_once() {
+    let store = tempfile::tempdir().unwrap();
+    let file = |name: &str, text: &str| fs::write(store.path().join(name), text).unwrap();
+    let strict = [&SIZE[..], &["--strict"]].concat();
+    file("a.obj", &format!("usemtl x\n{TRIANGLE}f 1 2 3\n"));
+    let said = render(store.path(), &store.path().join("a.obj"), "out", &strict, 1).stderr;
+    assert!(said.contains("a.obj:1: material `x` is in no library"), "{said}");
+    assert_eq!(said.matches("in no library").count(), 1, "{said}");
+    file("b.obj", &format!("mtllib b.mtl\nusemtl x\n{TRIANGLE}f 1 2 3\n"));
+    file("b.mtl", "newmtl x\nmap_Kd gone.png\nmap_d lost.png\n");
+    let said = render(store.path(), &store.path().join("b.obj"), "out", &strict, 1).stderr;
+    // the one that fails the frame, and the other
+    assert_eq!([said.matches("gone.png").count(), said.matches("lost.png").count()], [1, 1], "{said}");
+    assert_eq!(said.matches("--strict").count(), 1, "{said}");
+}
+
+#[test]
+fn faces_that_are_all_transparent_are_warned_of_once() {
+    let store = tempfile::tempdir().unwrap();
+    fs::write(store.path().join("a.mtl"), "newmtl a\nd 0\n").unwrap();
+    let obj = store.path().join("a.obj");
+    fs::write(&obj, format!("mtllib a.mtl\nusemtl a\n{TRIANGLE}f 1 2 3\n")).unwrap();
+    let said = render(store.path(), &obj, "out", &SIZE, 0).stderr;
+    assert_eq!(said.matches("warning").count(), 1, "{said}");
+    assert!(said.contains("every face is wholly transparent (d 0)") && said.contains("mistake"), "{said}");
+}
+
 /// The most that a device takes for a triangle while it builds its tree, bytes.
 const TREE_BYTES: u64 = 400;
 

@@ -93,7 +93,7 @@ pub struct Loaded {
     pub parse_ms: f64,
     /// What is wrong but does not stop the frame.
     pub warnings: Warnings,
-    /// Libraries and textures that were named and cannot be had, each as a sentence.
+    /// Libraries, textures and materials that were named and cannot be had, each as a sentence.
     pub missing: Vec<String>,
 }
 
@@ -142,9 +142,17 @@ pub fn load_obj_stored(
     };
     let mut warnings = stored.warnings(path);
     let mut loader = library::Loader::new(path, options);
-    let library = loader.library(&stored.libraries(), stored.used_materials(), textures, &mut warnings)?;
-    let shape = stored.into_shape(&library, path, &mut warnings);
+    let line_of = |word: &[u8], behind: &[u8]| line_in_file(path, text.as_deref(), word, behind);
+    let library =
+        loader.library(&stored.libraries(), stored.used_materials(), textures, &line_of, &mut warnings)?;
+    let shape = stored.into_shape(&library, path, &line_of, &mut warnings);
     Ok(loaded(ParseKind::Restored, path, digest.1, text, shape, loader, warnings, read_ms, &watch))
+}
+
+/// The line of a statement in a file of which the text may be at hand.
+fn line_in_file(path: &Path, text: Option<&[u8]>, word: &[u8], behind: &[u8]) -> Option<u32> {
+    let read = if text.is_none() { Some(text::read(path).ok()?) } else { None };
+    obj::line_of(&Text::new(text.or(read.as_deref())?, path).ok()?, word, behind)
 }
 
 /// Reads an OBJ in memory and all that it refers to; puts it into a store, where one is given, with whether another
@@ -165,7 +173,9 @@ fn load_text(
     let lines = obj::Lines::new(&text, path, options.lenient, before, &mut warnings)?;
     let said = store.map(|_| lines.said(&warnings));
     let mut loader = library::Loader::new(path, options);
-    let library = loader.library(lines.libraries(), lines.used_materials(), textures, &mut warnings)?;
+    let line_of = |word: &[u8], behind: &[u8]| obj::line_of(&text, word, behind);
+    let library =
+        loader.library(lines.libraries(), lines.used_materials(), textures, &line_of, &mut warnings)?;
     let shape = lines.into_shape(&library, options, &mut warnings);
     if let (Some((store, is_followed)), Some(said)) = (store, said) {
         // of these bytes: the file may have changed since it was looked for
@@ -181,12 +191,13 @@ fn loaded(
     path: &Path,
     length: u64,
     text: Option<Vec<u8>>,
-    shape: obj::Shape,
+    mut shape: obj::Shape,
     loader: library::Loader,
     warnings: Warnings,
     read_ms: f64,
     watch: &Stopwatch,
 ) -> (Loaded, Option<Parsed>) {
+    let missing = loader.missing.into_iter().chain(shape.missing.take()).collect();
     let inputs = std::iter::once(path.to_path_buf()).chain(loader.inputs).collect();
     let (geometry, material_names, parsed) = shape.keep(text);
     let loaded = Loaded {
@@ -198,7 +209,7 @@ fn loaded(
         read_ms,
         parse_ms: watch.ms(),
         warnings,
-        missing: loader.missing,
+        missing,
     };
     (loaded, parsed)
 }

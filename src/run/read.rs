@@ -10,7 +10,7 @@ use super::source::{Place, Sources};
 use super::{Note, RunOptions, panic_text};
 use crate::device::Stop;
 use crate::diff::Change;
-use crate::format::{FormatError, Loaded, ParseKind, ReadOptions};
+use crate::format::{FormatError, ParseKind, ReadOptions};
 use crate::job::{Job, Picture, Settings};
 use crate::output::{Bits, Encoding, Format, Records};
 use crate::scene::{Frame, Object, PartHash, PartHasher, Shot};
@@ -256,6 +256,11 @@ enum LoadError {
 }
 
 impl LoadError {
+    /// What is missing, where that fails the frame; it is told with its error, not as a warning, too.
+    fn missing(sentence: &str) -> Self {
+        Self::Bad(format!("{sentence}; the frame is not rendered (--strict)"))
+    }
+
     fn text(self) -> String {
         match self {
             Self::Bad(text) | Self::TooLarge(text) => text,
@@ -309,12 +314,13 @@ fn load_frame(
         let path = &layer.files[file].path;
         if let Some(moment) = &layer.files[file].moment {
             let shown = sources.animations.show(path, moment, &options, source.transform.as_ref(), true)?;
+            let missing = shown.gltf.missing.first().filter(|_| strict);
             if shown.is_first {
                 all.bytes_read += shown.gltf.bytes_read;
-                animation::tell(&shown.gltf, path, &options, warnings);
+                animation::tell(&shown.gltf, path, &options, missing, warnings);
             }
-            if strict && let Some(missing) = shown.gltf.missing.first() {
-                return Err(LoadError::Bad(format!("{missing}; the frame is not rendered (--strict)")));
+            if let Some(missing) = missing {
+                return Err(LoadError::missing(missing));
             }
             all.is_posed = true;
             all.parse_ms += shown.parse_ms;
@@ -330,16 +336,19 @@ fn load_frame(
             _ => Place::Later,
         };
         let (loaded, is_new) = sources.load(path, &options, place)?;
+        let missing = loaded.missing.first().filter(|_| strict);
         if is_new {
             all.kind = all.kind.max(loaded.kind);
             all.bytes_read += loaded.bytes_read;
             all.read_ms += loaded.read_ms;
             all.parse_ms += loaded.parse_ms;
-            warnings.merge(&loaded.warnings);
-            warn_of_materials(path, &loaded, warnings);
+            match missing {
+                Some(told) => warnings.merge(&loaded.warnings.without(told)),
+                None => warnings.merge(&loaded.warnings),
+            };
         }
-        if strict && let Some(missing) = loaded.missing.first() {
-            return Err(LoadError::Bad(format!("{missing}; the frame is not rendered (--strict)")));
+        if let Some(missing) = missing {
+            return Err(LoadError::missing(missing));
         }
         all.sources.push(at);
         all.frame
@@ -370,20 +379,6 @@ pub fn read_shot(job: &Job, options: &RunOptions) -> Result<(Frame, Shot), Strin
     let loaded = load_frame(job, picture, true, sources, options.lenient, options.strict, warnings);
     let LoadedFrame { frame, views, .. } = loaded.map_err(LoadError::text)?;
     Ok((frame, prepared.shot(picture, &views)?))
-}
-
-/// Names frames that nothing can be seen of.
-fn warn_of_materials(path: &Path, loaded: &Loaded, warnings: &mut Warnings) {
-    let g = &loaded.geometry;
-    let has_faces = !g.triangles.0.is_empty();
-    let is_seen = |run: &[u32; 2]| g.materials.get(run[1] as usize).is_none_or(|m| m.d > 0.0);
-    if has_faces && !g.material_runs.0.iter().any(is_seen) {
-        warnings.add(
-            Some(path),
-            None,
-            "every face is wholly transparent (d 0); some exporters write that by mistake",
-        );
-    }
 }
 
 /// How a layer of a picture is read.

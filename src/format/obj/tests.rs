@@ -145,13 +145,24 @@ fn indices_of_attributes_that_are_not_there_count_as_absent() {
         assert!(g.texcoords.is_none() && g.normals.is_none(), "{corner}");
         assert_eq!(
             warning,
-            format!("a.obj: a {kind} index names none that can be used; it counts as absent")
+            format!("a.obj:7: a {kind} index is 0 or beyond the file's 1 {kind}s; it counts as absent")
         );
     }
-    for normal in ["vn 0 0 0", "vn nan 0 1", "vn 1e39 0 0"] {
-        let (g, _) = odd(format!("{SQUARE}vn 0 0 1\n{normal}\nf 1//1 2//2 3//2\n"));
+    for (normal, cause) in [
+        ("vn 0 0 0", "a normal has length 0"),
+        ("vn nan 0 1", "a normal is not three finite numbers"),
+        ("vn 1e39 0 0", "a normal is not three finite numbers"),
+    ] {
+        let (g, warning) = odd(format!("{SQUARE}vn 0 0 1\n{normal}\nf 1//1 2//2 3//2\n"));
         assert_eq!(g.normals.unwrap().corners.0, [[0, ABSENT, ABSENT]], "{normal}");
+        assert_eq!(
+            warning,
+            format!("a.obj:6: {cause}; where a corner names it, it counts as absent (2 times)")
+        );
     }
+    // faces that were dropped are not counted among the lines
+    let (_, warnings) = parse(format!("{SQUARE}f 1 2 9\nf 1/1 2 3\n"), true);
+    assert!(warnings.iter().any(|w| w.starts_with("a.obj: a texcoord index")), "{warnings:?}");
     let (g, _) = odd(format!("{SQUARE}vt nan 0\nf 1/1 2/1 3/1\n"));
     assert!(g.texcoords.is_none());
 }
@@ -195,7 +206,11 @@ fn what_is_left_out_is_counted() {
     );
     assert_eq!(
         warning("usemtl green\nf 1 2 3\n"),
-        "a.obj: material `green` is in no library; its faces get the default"
+        "a.obj:5: material `green` is in no library; its faces get the default"
+    );
+    assert_eq!(
+        warning("# usemtl green\ng usemtl green\nusemtl red\n usemtl\tgreen # so\nf 1 2 3\n"),
+        "a.obj:8: material `green` is in no library; its faces get the default"
     );
     let empty = odd("");
     assert_eq!(empty.1, "a.obj: the file is empty; its frame shows the background");
