@@ -8,12 +8,12 @@ use thiserror::Error;
 #[derive(Debug, Error)]
 pub enum FormatError {
     /// The file or its folder cannot be read.
-    #[error("{}: cannot be read: {source}; check that it exists and that its permissions allow reading", path.display())]
+    #[error("{}: cannot be read: {cause}; check that it exists and that its permissions allow reading", path.display())]
     Unreadable {
         /// The file.
         path: PathBuf,
         /// What the system said.
-        source: io::Error,
+        cause: io::Error,
     },
     /// A folder, a pipe or a device stands where a file should.
     #[error("{}: is not a plain file; name an OBJ file", path.display())]

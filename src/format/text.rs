@@ -124,8 +124,8 @@ fn continues(bytes: &[u8], end: usize) -> bool {
     bytes[..end].strip_suffix(b"\r").unwrap_or(&bytes[..end]).ends_with(b"\\")
 }
 
-fn unreadable(path: &Path, source: io::Error) -> FormatError {
-    FormatError::Unreadable { path: path.to_path_buf(), source }
+fn unreadable(path: &Path, cause: io::Error) -> FormatError {
+    FormatError::Unreadable { path: path.to_path_buf(), cause }
 }
 
 /// Opens a plain file that is not too long; its length, which may grow.

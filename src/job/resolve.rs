@@ -69,6 +69,7 @@ pub fn resolve(request: &Request) -> Result<Job, JobError> {
     }
     let name = name.unwrap_or_default();
 
+    job.warn_of_what_is_for_nothing(&job_file);
     job.place_in_folders();
     job.choose(&job_file)?;
     job.inputs.extend(
@@ -94,7 +95,7 @@ pub fn resolve(request: &Request) -> Result<Job, JobError> {
     })
 }
 
-fn is_job_file(path: &Path) -> bool {
+pub(super) fn is_job_file(path: &Path) -> bool {
     let is_yaml = |e: &std::ffi::OsStr| e.eq_ignore_ascii_case("yaml") || e.eq_ignore_ascii_case("yml");
     path.extension().is_some_and(is_yaml) && !path.is_dir()
 }
@@ -251,6 +252,27 @@ impl Resolving<'_> {
         Ok(settings)
     }
 
+    /// Overrides that are for none of the frames, and a clip where nothing has one.
+    fn warn_of_what_is_for_nothing(&mut self, job: &JobFile) {
+        let applied: HashSet<usize> = self.settings.keys().flatten().copied().collect();
+        // frames that an override is for may come yet
+        let idle = (0..job.overrides.len()).filter(|i| !applied.contains(i) && !self.request.grows);
+        for i in idle {
+            let text = "an override is for none of the frames; check its `frames` and `files`";
+            self.warnings.add(Some(job.path()), Some(job.overrides[i].line), text);
+        }
+        let mut files = self.sequences.iter().flat_map(|s| &s.layers).flat_map(|l| &l.files);
+        if files.any(|f| f.moment.is_some()) {
+            return;
+        }
+        if job.clip != ClipChoice::Auto {
+            let text = "`clip` is for glTF files and there is none; it changes nothing";
+            self.warnings.add(Some(job.path()), None, text);
+        } else if self.request.clip.is_some() && self.request.dropped.is_none() {
+            self.warnings.add(None, None, "--clip is for glTF files and there is none; it changes nothing");
+        }
+    }
+
     /// Where several sequences would write one name, each gets a folder of its own.
     fn place_in_folders(&mut self) {
         let mut owner: HashMap<&Path, usize> = HashMap::new();
@@ -293,15 +315,37 @@ impl Resolving<'_> {
             }
             self.pictures.retain(|p| p.frame.is_some_and(|f| set.contains(f)));
         }
-        let mut seen = HashSet::new();
-        if let Some(twice) = self.pictures.iter().find(|p| !seen.insert(&p.picture)) {
-            return Err(JobError::TwoOfAName(twice.picture.clone()));
+        let mut seen: HashMap<&Path, &Picture> = HashMap::new();
+        for second in &self.pictures {
+            if let Some(first) = seen.insert(&second.picture, second) {
+                return Err(self.two_of_a_name(first, second));
+            }
         }
         if let Some(chunk) = self.request.chunk {
             self.pictures = self.pictures[chunk.range(self.pictures.len())].to_vec();
         }
         self.request.order.apply(&mut self.pictures);
         Ok(())
+    }
+
+    /// Names both frames and what would part them.
+    fn two_of_a_name(&self, first: &Picture, second: &Picture) -> JobError {
+        let file = |p: &Picture| p.main_file(&self.sequences[p.sequence]).cloned();
+        let (files, frames) = ([file(first), file(second)], [first.frame, second.frame]);
+        let named = |i: usize| match (&files[i], frames[i]) {
+            (Some(file), _) if files[0] != files[1] => file.path.display().to_string(),
+            (_, Some(frame)) => format!("frame {frame}"),
+            _ => "a frame".to_string(),
+        };
+        let stems = files.each_ref().map(|file| file.as_ref().map(|f| &f.stem));
+        let remedy = if stems[0] != stems[1] {
+            "put {stem} or {frame} into the name"
+        } else if frames[0] != frames[1] {
+            "put {frame} into the name"
+        } else {
+            "rename one, or use --one-sequence with {frame} in the name (--name)"
+        };
+        JobError::TwoOfAName { first: named(0), second: named(1), picture: second.picture.clone(), remedy }
     }
 }
 

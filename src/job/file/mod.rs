@@ -41,6 +41,11 @@ pub(super) struct JobFile {
 }
 
 impl JobFile {
+    /// The file itself.
+    pub(super) fn path(&self) -> &Path {
+        &self.path
+    }
+
     /// Something wrong at a place in the file that shows only beside what is on the disk or in other keys.
     pub(super) fn wrong(&self, place: &str, text: String) -> JobError {
         JobError::File { path: self.path.clone(), place: place.to_string(), text }
@@ -78,6 +83,8 @@ const OUTSIDES: [(&str, Outside); 3] =
 #[derive(Debug)]
 pub(super) struct Override {
     pub(super) frames: Option<FrameSet>,
+    /// Where it stands.
+    pub(super) line: u32,
     /// On the stem.
     pub(super) files: Option<Pattern>,
     pub(super) options: Options,
@@ -90,17 +97,32 @@ const MAX_BYTES: u64 = 1 << 20;
 
 /// Reads a job file; paths in it are relative to its folder.
 pub(super) fn read(path: &Path) -> Result<JobFile, JobError> {
-    let unreadable = |source| JobError::Unreadable { path: path.to_path_buf(), source };
+    let unreadable = |cause| JobError::Unreadable { path: path.to_path_buf(), cause };
     let wrong = |place: String, text: String| JobError::File { path: path.to_path_buf(), place, text };
-    let mut yaml = String::new();
+    let mut bytes = Vec::new();
     let file = std::fs::File::open(path).map_err(unreadable)?;
-    file.take(MAX_BYTES + 1).read_to_string(&mut yaml).map_err(unreadable)?;
-    if yaml.len() as u64 > MAX_BYTES {
+    file.take(MAX_BYTES + 1).read_to_end(&mut bytes).map_err(unreadable)?;
+    if bytes.len() as u64 > MAX_BYTES {
         return Err(wrong(String::new(), format!("is longer than the {MAX_BYTES} bytes of any job file")));
     }
     // what the file says may be for a terminal to obey
     let plain = |text: String| text.replace(char::is_control, "\u{fffd}");
-    parse(&yaml, path).map_err(|e| wrong(format!(":{}:{}", e.line, e.column), plain(e.to_string())))
+    let read = decoded(bytes).and_then(|yaml| parse(&yaml, path));
+    read.map_err(|e| wrong(format!(":{}:{}", e.line, e.column), plain(e.to_string())))
+}
+
+/// The text of a file, which is UTF-8.
+fn decoded(bytes: Vec<u8>) -> Read<String> {
+    let wrong = |line, column, text: &str| Err(Wrong { line, column, key: None, text: text.to_string() });
+    if bytes.starts_with(b"\xFF\xFE") || bytes.starts_with(b"\xFE\xFF") {
+        return wrong(1, 1, "is UTF-16 text; save it as UTF-8");
+    }
+    String::from_utf8(bytes).or_else(|e| {
+        let text = String::from_utf8_lossy(&e.as_bytes()[..e.utf8_error().valid_up_to()]);
+        let line = text.split('\n').count();
+        let column = 1 + text.rsplit('\n').next().map_or(0, |last| last.chars().count());
+        wrong(line as u64, column as u64, "is not UTF-8 text; save it as UTF-8")
+    })
 }
 
 /// Keys that the job and its overrides share.
@@ -259,7 +281,13 @@ fn override_of(node: &Node, said_in: &Path) -> Read<Override> {
     let mut options = scene_options(&map, said_in)?;
     picture_options(&map, &mut options)?;
     let bits_at = map.node("bits").map(place_of);
-    Ok(Override { frames: map.get("frames", frames)?, files: map.get("files", pattern)?, options, bits_at })
+    Ok(Override {
+        frames: map.get("frames", frames)?,
+        line: u32::try_from(node.referenced.line()).unwrap_or(u32::MAX),
+        files: map.get("files", pattern)?,
+        options,
+        bits_at,
+    })
 }
 
 fn pattern(node: &Node) -> Read<Pattern> {

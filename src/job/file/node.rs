@@ -77,6 +77,11 @@ pub(super) fn parse(text: &str) -> Result<Node, Wrong> {
             serde_yaml::Error::AliasError { error, .. } => error,
             error => error,
         };
+        let tab = cause.to_string().contains("found a tab").then(|| indenting_tab(text, line)).flatten();
+        if let Some((line, column)) = tab {
+            let text = "a tab indents this line; in YAML only blanks do".to_string();
+            return Wrong { line, column, key: None, text };
+        }
         let text = match cause {
             serde_yaml::Error::DuplicateMappingKey { key, .. } => {
                 format!("duplicate key `{}`; remove one", key.as_deref().unwrap_or_default())
@@ -84,11 +89,21 @@ pub(super) fn parse(text: &str) -> Result<Node, Wrong> {
             serde_yaml::Error::Budget { .. } => {
                 "is too much for a job file with all that its aliases stand for".to_string()
             }
+            serde_yaml::Error::MultipleDocuments { .. } => {
+                "multiple YAML documents, parted by `---`; a job file is one: remove the others".to_string()
+            }
             // the place stands in front already
             cause => cause.to_string().split(" at line ").next().unwrap_or_default().to_string(),
         };
         Wrong { line, column, key: None, text }
     })
+}
+
+/// Where the first tab among the blanks before a line stands, from a line on: the library names the value before it.
+fn indenting_tab(text: &str, first: u64) -> Option<(u64, u64)> {
+    let lines = (1..).zip(text.lines()).filter(|(number, _)| *number >= first);
+    let tab = |line: &str| line.find(|c| c != ' ').filter(|&at| line[at..].starts_with('\t'));
+    lines.into_iter().find_map(|(number, line)| tab(line).map(|at| (number, at as u64 + 1)))
 }
 
 impl<'de> Deserialize<'de> for Value {

@@ -173,13 +173,27 @@ fn errors_of_layers_and_of_the_whole() {
             "another key at frame 1",
         ),
         ("layers: [{sequence: a, transform: {keys: [{frame: 1}], scale: 2}}]\n", (1, 35), "in the keys"),
-        ("sequence: a\n---\nsequence: b\n", (3, 1), "multiple"),
+        ("sequence: a\n---\nsequence: b\n", (3, 1), "multiple YAML documents, parted by `---`"),
+        ("sequence: a\n\tsamples: 4\n", (2, 1), "a tab indents this line"),
+        ("sequence: a\noutput:\n  \tbits: 8\n", (3, 3), "a tab indents this line"),
     ];
     for (yaml, place, words) in cases {
         let e = parse(yaml, Path::new("")).unwrap_err();
         let is_right = (e.line, e.column) == *place && e.to_string().contains(words);
         assert!(is_right, "{yaml} → {}:{}: {e}", e.line, e.column);
     }
+}
+
+#[test]
+fn a_job_file_is_utf_8() {
+    let refused = |bytes: &[u8]| {
+        let wrong = decoded(bytes.to_vec()).unwrap_err();
+        format!("{}:{}: {wrong}", wrong.line, wrong.column)
+    };
+    assert_eq!(refused(b"\xff\xfes\0e\0"), "1:1: is UTF-16 text; save it as UTF-8");
+    assert_eq!(refused(b"name: a\nsequence: w\xf6\n"), "2:12: is not UTF-8 text; save it as UTF-8");
+    assert_eq!(refused(b"name: \xc3\xb6\xff"), "1:8: is not UTF-8 text; save it as UTF-8");
+    assert_eq!(decoded("sequence: wö".into()).unwrap(), "sequence: wö");
 }
 
 #[test]
