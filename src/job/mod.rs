@@ -4,6 +4,7 @@ mod animation;
 pub mod auto;
 mod discover;
 mod dropped;
+mod extent;
 mod file;
 mod names;
 pub mod numbers;

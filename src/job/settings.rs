@@ -1,5 +1,6 @@
 //! The settings of one picture: every option with its default filled in.
 
+use super::extent;
 use super::options::{Background, CameraChoice, LightChoice, Options, limits};
 use super::track::{CameraPose, CameraTrack, Interpolation, Key};
 use super::words::{listed, nearest, one_of};
@@ -86,6 +87,8 @@ impl Settings {
         let o = options.clone();
         check_bits(&o)?;
         let format = o.format.clone().unwrap_or_else(|| FORMATS[0].to_string());
+        let size = o.size.unwrap_or([1280, 720]);
+        extent::check(&format, size, o.bits.unwrap_or(8), o.alpha.unwrap_or(false))?;
         let read = ReadOptions {
             smooth_angle_deg: o.smooth_angle,
             mtl_srgb: o.mtl_srgb.unwrap_or(false),
@@ -99,7 +102,7 @@ impl Settings {
             fov_deg: o.fov.unwrap_or(40.0),
             ambient: o.ambient.unwrap_or(Vec3::splat(0.1)),
             background: o.background.unwrap_or(Background::Color(Vec3::ZERO)),
-            size: o.size.unwrap_or([1280, 720]),
+            size,
             samples: o.samples.unwrap_or(1),
             filter: o.filter.unwrap_or_default(),
             depth: o.depth.unwrap_or(10),
@@ -350,6 +353,9 @@ mod tests {
         };
         assert!(clear("webp").is_none() && Settings::new(&Options::default()).unwrap().left_out().is_none());
         assert!(clear("jpg").unwrap().starts_with("jpg has no alpha"));
+        let wide =
+            Options { format: Some("webp".to_string()), size: Some([20_000, 16]), ..Options::default() };
+        assert!(Settings::new(&wide).unwrap_err().contains("16384 pixels a side"));
         assert!(sixteen("jp2") && sixteen("exr") && !sixteen("bmp"));
     }
 }
