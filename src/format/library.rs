@@ -65,6 +65,8 @@ pub(super) struct Loader<'a> {
     pub bytes_read: u64,
     /// What was named and cannot be had, each as a sentence.
     pub missing: Vec<String>,
+    /// Names that overrides speak of and that are not wanted.
+    pub unmet_overrides: Vec<Vec<u8>>,
 }
 
 impl<'a> Loader<'a> {
@@ -79,6 +81,7 @@ impl<'a> Loader<'a> {
             seen: HashSet::new(),
             bytes_read: 0,
             missing: Vec::new(),
+            unmet_overrides: Vec::new(),
         }
     }
 
@@ -93,6 +96,8 @@ impl<'a> Loader<'a> {
     ) -> Result<Library, FormatError> {
         let names: HashSet<&[u8]> = names.collect();
         let is_wanted = |name: &[u8]| names.contains(name);
+        let spoken_of = self.options.material_overrides.iter().map(|change| &change.name);
+        self.unmet_overrides = spoken_of.filter(|name| !is_wanted(name)).cloned().collect();
         self.read_libraries(libraries, line_of, &is_wanted, warnings);
         if let Some(file) = &self.options.materials_file {
             let materials = self.read_library(file, &is_wanted, warnings)?;

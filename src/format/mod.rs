@@ -95,6 +95,8 @@ pub struct Loaded {
     pub warnings: Warnings,
     /// Libraries, textures and materials that were named and cannot be had, each as a sentence.
     pub missing: Vec<String>,
+    /// Names of materials that the options' overrides speak of and no face has.
+    pub unmet_overrides: Vec<Vec<u8>>,
 }
 
 /// Reads an OBJ and all that it refers to; textures through a cache. Must not be called from a thread of rayon's pool
@@ -210,6 +212,7 @@ fn loaded(
         parse_ms: watch.ms(),
         warnings,
         missing,
+        unmet_overrides: loader.unmet_overrides,
     };
     (loaded, parsed)
 }

@@ -7,6 +7,7 @@ use super::memory::{expected_bytes, needed_bytes, reckoned_bytes, refusal};
 use super::prepare::{Prepared, prepare};
 use super::share::{Share, Turn};
 use super::source::{Place, Sources};
+use super::spoken::Spoken;
 use super::{Note, RunOptions, panic_text};
 use crate::device::Stop;
 use crate::diff::Change;
@@ -16,7 +17,7 @@ use crate::output::{Bits, Encoding, Format, Records};
 use crate::scene::{Frame, Object, PartHash, PartHasher, Shot};
 use crate::schedule::estimate::Term;
 use crate::warning::Warnings;
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -60,6 +61,7 @@ pub(super) struct Reader<'a> {
     last_shown: HashMap<&'a Path, usize>,
     /// The first picture of each sequence.
     first_of: HashMap<usize, usize>,
+    spoken: Spoken,
 }
 
 /// Reads pictures for devices until there are no more.
@@ -101,7 +103,13 @@ impl<'a> Reader<'a> {
             last_shown.extend(files(job, picture).map(|(_, path)| (path, index)));
             first_of.entry(picture.sequence).or_insert(index);
         }
-        Self { job, options, records, prepared, estimator, at_once, last_shown, first_of }
+        let spoken = Spoken::default();
+        Self { job, options, records, prepared, estimator, at_once, last_shown, first_of, spoken }
+    }
+
+    /// What is to be told of materials that the job speaks of and no frame that was read has.
+    pub(super) fn unmet_overrides(&self) -> Warnings {
+        self.spoken.unmet()
     }
 
     /// Which objects of a picture stand in files that later pictures show, too.
@@ -136,6 +144,9 @@ impl<'a> Reader<'a> {
                 report.ms.read = Some(loaded.read_ms);
                 report.ms.parse = Some(loaded.parse_ms);
                 let parsing = loaded.parsing();
+                if let Some(unmet) = loaded.unmet_overrides {
+                    self.spoken.see(&picture.settings.read.material_overrides, |name| unmet.contains(name));
+                }
                 (loaded.frame, loaded.views, loaded.sources, parsing)
             }
             Err(error) => {
@@ -233,9 +244,19 @@ struct LoadedFrame {
     bytes_read: u64,
     read_ms: f64,
     parse_ms: f64,
+    /// Names of materials that the job speaks of and none of its files has; None: it has no file.
+    unmet_overrides: Option<HashSet<Vec<u8>>>,
 }
 
 impl LoadedFrame {
+    /// Takes the names that one of its files does not have.
+    fn without_materials(&mut self, unmet: &[Vec<u8>]) {
+        match &mut self.unmet_overrides {
+            Some(all) => all.retain(|name| unmet.contains(name)),
+            None => self.unmet_overrides = Some(unmet.iter().cloned().collect()),
+        }
+    }
+
     /// What kind of work its parsing was.
     fn parsing(&self) -> Term<'static> {
         match self.kind {
@@ -306,6 +327,7 @@ fn load_frame(
         bytes_read: 0,
         read_ms: 0.0,
         parse_ms: 0.0,
+        unmet_overrides: None,
     };
     for (at, source) in picture.sources.iter().enumerate() {
         let Some(file) = source.file else { continue };
@@ -322,6 +344,7 @@ fn load_frame(
             if let Some(missing) = missing {
                 return Err(LoadError::missing(missing));
             }
+            all.without_materials(&shown.gltf.unmet_overrides);
             all.is_posed = true;
             all.parse_ms += shown.parse_ms;
             all.views.cameras.extend(shown.views.cameras);
@@ -350,6 +373,7 @@ fn load_frame(
         if let Some(missing) = missing {
             return Err(LoadError::missing(missing));
         }
+        all.without_materials(&loaded.unmet_overrides);
         all.sources.push(at);
         all.frame
             .objects
