@@ -44,7 +44,7 @@ pub enum FormatError {
         path: PathBuf,
     },
     /// An OBJ with a zero byte.
-    #[error("{}:{line}: is binary, not text; the frame is not rendered (export it again, or name an OBJ file)", path.display())]
+    #[error("{}:{line}: is binary, not text; export it again, or name an OBJ file", path.display())]
     Binary {
         /// The file.
         path: PathBuf,
@@ -52,7 +52,7 @@ pub enum FormatError {
         line: u32,
     },
     /// An OBJ in which nothing is a statement of one.
-    #[error("{}:{line}: is no OBJ: none of its lines is a statement of one, the first is `{statement}`; the frame is not rendered (export it again, or name an OBJ file)", path.display())]
+    #[error("{}:{line}: is no OBJ: none of its lines is a statement of one, the first is `{statement}`; export it again, or name an OBJ file", path.display())]
     NoObj {
         /// The file.
         path: PathBuf,

@@ -375,7 +375,7 @@ mod tests {
     #[test]
     fn the_first_zero_byte_is_found_and_lines_are_joined_all_the_same() {
         let t = text(b"v 1 \\\n2 3\nv\0\0 \\\n1\n");
-        assert_eq!((t.first_zero, &t.joined[..]), (Some(13), &b"v 1   2 3\nv\0\0   1\n"[..]));
+        assert_eq!((t.first_zero, &t.joined[..]), (Some(11), &b"v 1   2 3\nv\0\0   1\n"[..]));
         assert_eq!(text(b"v 1 2 3\n").first_zero, None);
     }
 

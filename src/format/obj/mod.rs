@@ -241,8 +241,10 @@ impl<'a> Lines<'a> {
         {
             let Tally { count: times, first } = refused.beyond;
             if times > 0 {
-                let text =
-                    format!("a {kind} index is 0 or beyond the file's {count} {kind}s; it counts as absent");
+                let plural = if count == 1 { "" } else { "s" };
+                let text = format!(
+                    "a {kind} index is 0 or beyond the file's {count} {kind}{plural}; it counts as absent"
+                );
                 warnings.add_times(Some(self.path), self.line_of_corner(first), text, times);
             }
         }

@@ -145,7 +145,7 @@ fn indices_of_attributes_that_are_not_there_count_as_absent() {
         assert!(g.texcoords.is_none() && g.normals.is_none(), "{corner}");
         assert_eq!(
             warning,
-            format!("a.obj:7: a {kind} index is 0 or beyond the file's 1 {kind}s; it counts as absent")
+            format!("a.obj:7: a {kind} index is 0 or beyond the file's 1 {kind}; it counts as absent")
         );
     }
     for (normal, cause) in [
@@ -172,7 +172,7 @@ fn what_is_something_else_is_refused() {
     let refused = |bytes: &[u8]| parse(bytes, true).0.err();
     assert_eq!(
         refused(b"# a\n\nsolid cube # of steel\nfacet normal 0 0 1\n").unwrap(),
-        "a.obj:3: is no OBJ: none of its lines is a statement of one, the first is `solid cube # of steel`; the frame is not rendered (export it again, or name an OBJ file)"
+        "a.obj:3: is no OBJ: none of its lines is a statement of one, the first is `solid cube # of steel`; export it again, or name an OBJ file"
     );
     assert!(refused(b"\x1f\x8b\x08\0\0abc").unwrap().starts_with("a.obj:1: is binary, not text"));
     assert!(refused(b"v 0 0 0\n# \0\n").unwrap().starts_with("a.obj:2: is binary"));

@@ -77,11 +77,6 @@ pub(super) fn parse(text: &str) -> Result<Node, Wrong> {
             serde_yaml::Error::AliasError { error, .. } => error,
             error => error,
         };
-        let tab = cause.to_string().contains("found a tab").then(|| indenting_tab(text, line)).flatten();
-        if let Some((line, column)) = tab {
-            let text = "a tab indents this line; in YAML only blanks do".to_string();
-            return Wrong { line, column, key: None, text };
-        }
         let text = match cause {
             serde_yaml::Error::DuplicateMappingKey { key, .. } => {
                 format!("duplicate key `{}`; remove one", key.as_deref().unwrap_or_default())
@@ -92,6 +87,10 @@ pub(super) fn parse(text: &str) -> Result<Node, Wrong> {
             serde_yaml::Error::MultipleDocuments { .. } => {
                 "multiple YAML documents, parted by `---`; a job file is one: remove the others".to_string()
             }
+            cause if let Some((line, column)) = indenting_tab(text, line, &cause.to_string()) => {
+                let text = "a tab indents this line; in YAML only blanks do".to_string();
+                return Wrong { line, column, key: None, text };
+            }
             // the place stands in front already
             cause => cause.to_string().split(" at line ").next().unwrap_or_default().to_string(),
         };
@@ -99,11 +98,13 @@ pub(super) fn parse(text: &str) -> Result<Node, Wrong> {
     })
 }
 
-/// Where the first tab among the blanks before a line stands, from a line on: the library names the value before it.
-fn indenting_tab(text: &str, first: u64) -> Option<(u64, u64)> {
-    let lines = (1..).zip(text.lines()).filter(|(number, _)| *number >= first);
+/// Where a tab stands among the blanks before the line of an error; where the library speaks of a tab, before that line or
+/// a later one: it may name the value before it.
+fn indenting_tab(text: &str, line: u64, told: &str) -> Option<(u64, u64)> {
+    let is_meant = |number: u64| number == line || (number > line && told.contains("found a tab"));
     let tab = |line: &str| line.find(|c| c != ' ').filter(|&at| line[at..].starts_with('\t'));
-    lines.into_iter().find_map(|(number, line)| tab(line).map(|at| (number, at as u64 + 1)))
+    let mut lines = (1..).zip(text.lines()).filter(|(number, _)| is_meant(*number));
+    lines.find_map(|(number, line)| tab(line).map(|at| (number, at as u64 + 1)))
 }
 
 impl<'de> Deserialize<'de> for Value {

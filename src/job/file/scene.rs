@@ -195,7 +195,7 @@ fn area(node: &Node) -> Read<Light> {
 pub(super) fn materials(node: &Node, said_in: &Path) -> Read<Vec<MaterialOverride>> {
     let mut materials = Vec::new();
     for (name, node) in entries(node)? {
-        let words = statements(&name.value, node).map_err(|wrong| about(&name.value, wrong))?;
+        let words = statements(node).map_err(|wrong| about(&name.value, wrong))?;
         let name = name.value.clone().into_bytes();
         materials.push(MaterialOverride { name, words, said_in: said_in.to_path_buf() });
     }
@@ -203,16 +203,13 @@ pub(super) fn materials(node: &Node, said_in: &Path) -> Read<Vec<MaterialOverrid
 }
 
 /// The words for one material, each with a value that it takes.
-fn statements(name: &str, node: &Node) -> Read<Vec<(String, String)>> {
+fn statements(node: &Node) -> Read<Vec<(String, String)>> {
     let mut words = Vec::new();
     for (word, node) in entries(node)? {
         let Some(wanted) = mtl_word_takes(&word.value) else {
             let hint = nearest(&word.value, mtl_words());
             let allowed = listed(mtl_words());
-            let text = format!(
-                "material {name}: `{}` is not a word of an MTL{hint}; allowed: {allowed}",
-                word.value
-            );
+            let text = format!("`{}` is not a word of an MTL{hint}; allowed: {allowed}", word.value);
             return Err(Wrong::at(word, text));
         };
         let about_word = |wrong| about(&word.value, wrong);

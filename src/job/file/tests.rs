@@ -124,7 +124,7 @@ fn errors_have_line_and_column_what_is_allowed_and_the_nearest_name() {
         ("output: 3", (3, 9), &["output", "a map"]),
         ("frames: 1-", (3, 9), &["frames", "1-"]),
         ("aov: [depth, norml]", (3, 6), &["aov", "norml", "did you mean `normal`"]),
-        ("materials: {a: {Kx: 1}}", (3, 17), &["material a", "Kx"]),
+        ("materials: {a: {Kx: 1}}", (3, 17), &["materials.a: `Kx`"]),
         ("materials: {a: {Nii: 1.5}}", (3, 17), &["`Nii`", "did you mean `Ni`", "allowed: Ka, Kd", "illum"]),
         ("materials: {a: {illum: 11}}", (3, 24), &["materials.a.illum", "a whole number from 0 to 10", "11"]),
         ("materials: {a: {Kd: red}}", (3, 21), &["materials.a.Kd", "three numbers, or one", "`red`"]),
@@ -175,7 +175,8 @@ fn errors_of_layers_and_of_the_whole() {
         ("layers: [{sequence: a, transform: {keys: [{frame: 1}], scale: 2}}]\n", (1, 35), "in the keys"),
         ("sequence: a\n---\nsequence: b\n", (3, 1), "multiple YAML documents, parted by `---`"),
         ("sequence: a\n\tsamples: 4\n", (2, 1), "a tab indents this line"),
-        ("sequence: a\noutput:\n  \tbits: 8\n", (3, 3), "a tab indents this line"),
+        ("sequence: a\noutput:\n\tbits: 8\n", (3, 1), "a tab indents this line"),
+        ("sequence: a\n\n# so\n  \tsamples: 4\n", (4, 3), "a tab indents this line"),
     ];
     for (yaml, place, words) in cases {
         let e = parse(yaml, Path::new("")).unwrap_err();
