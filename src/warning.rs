@@ -64,6 +64,16 @@ impl Warnings {
         new
     }
 
+    /// Those that do not read as the sentence, which is told another way.
+    #[must_use]
+    pub fn without(&self, sentence: &str) -> Self {
+        let mut others = self.clone();
+        others.by_cause.retain(|(file, text), (line, _)| {
+            Warning { file: file.clone(), line: *line, text: text.clone(), count: 1 }.to_string() != sentence
+        });
+        others
+    }
+
     /// All warnings, ordered by file and text.
     pub fn list(&self) -> Vec<Warning> {
         self.by_cause

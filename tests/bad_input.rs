@@ -48,6 +48,34 @@ fn with_strict_what_is_missing_fails_the_frame() {
     }
 }
 
+#[test]
+fn with_strict_what_is_missing_is_told_once() {
+    let store = tempfile::tempdir().unwrap();
+    let file = |name: &str, text: &str| fs::write(store.path().join(name), text).unwrap();
+    let strict = [&SIZE[..], &["--strict"]].concat();
+    file("a.obj", &format!("usemtl x\n{TRIANGLE}f 1 2 3\n"));
+    let said = render(store.path(), &store.path().join("a.obj"), "out", &strict, 1).stderr;
+    assert!(said.contains("a.obj:1: material `x` is in no library"), "{said}");
+    assert_eq!(said.matches("in no library").count(), 1, "{said}");
+    file("b.obj", &format!("mtllib b.mtl\nusemtl x\n{TRIANGLE}f 1 2 3\n"));
+    file("b.mtl", "newmtl x\nmap_Kd gone.png\nmap_d lost.png\n");
+    let said = render(store.path(), &store.path().join("b.obj"), "out", &strict, 1).stderr;
+    // the one that fails the frame, and the other
+    assert_eq!([said.matches("gone.png").count(), said.matches("lost.png").count()], [1, 1], "{said}");
+    assert_eq!(said.matches("--strict").count(), 1, "{said}");
+}
+
+#[test]
+fn faces_that_are_all_transparent_are_warned_of_once() {
+    let store = tempfile::tempdir().unwrap();
+    fs::write(store.path().join("a.mtl"), "newmtl a\nd 0\n").unwrap();
+    let obj = store.path().join("a.obj");
+    fs::write(&obj, format!("mtllib a.mtl\nusemtl a\n{TRIANGLE}f 1 2 3\n")).unwrap();
+    let said = render(store.path(), &obj, "out", &SIZE, 0).stderr;
+    assert_eq!(said.matches("warning").count(), 1, "{said}");
+    assert!(said.contains("every face is wholly transparent (d 0)") && said.contains("mistake"), "{said}");
+}
+
 /// The most that a device takes for a triangle while it builds its tree, bytes.
 const TREE_BYTES: u64 = 400;
 
@@ -99,7 +127,7 @@ fn one_line(bytes: usize) {
         ("mtllib ", "a "),
         ("", "\\\n"),
         ("l", " 1 2"),
-        ("unknown", "\0"),
+        ("unknown", "\u{1}"),
     ] {
         rendered_text(&format!("{TRIANGLE}f 1 2 3\n{start}{}", filling.repeat(bytes / filling.len())));
     }
@@ -188,6 +216,26 @@ fn a_frame_that_cannot_be_read_fails_alone() {
     let names: Vec<String> = pictures(&store.path().join("out")).into_keys().collect();
     assert_eq!(names, ["a_1.png", "a_5.png"], "{}", run.stderr);
     assert!(run.stderr.contains("a_4.obj:4: position index 4"), "{}", run.stderr);
+}
+
+#[test]
+fn files_that_are_something_else_fail_alone_and_move_no_camera() {
+    let store = tempfile::tempdir().unwrap();
+    let folder = store.path().join("walk");
+    fs::create_dir(&folder).unwrap();
+    fs::write(folder.join("a_1.obj"), format!("{TRIANGLE}f 1 2 3\n")).unwrap();
+    let run = render(store.path(), &folder, "alone", &SIZE, 0);
+    assert!(!run.stderr.contains("warning"), "{}", run.stderr);
+    fs::write(folder.join("a_2.obj"), "\u{1}\0\0\nv 900 0 0\nv 0 900 0\n").unwrap();
+    fs::write(folder.join("a_3.obj"), "<html>\n<p>gone</p>\n</html>\n").unwrap();
+    let run = render(store.path(), &folder, "out", &SIZE, 1);
+    for told in ["a_2.obj:1: is binary, not text", "a_3.obj:1: is no OBJ", "the first is `<html>`"] {
+        assert!(run.stderr.contains(told), "{told}: {}", run.stderr);
+    }
+    assert_eq!(pictures(&store.path().join("out")), pictures(&store.path().join("alone")));
+    let inspected = common::run(store.path(), ["inspect", folder.to_str().unwrap(), "--device", "cpu"]);
+    assert!(inspected.status == 1 && inspected.stdout.contains("a_1"), "{}", inspected.stderr);
+    assert!(inspected.stderr.contains("a_2.obj:1: ") && inspected.stderr.contains("a_3.obj:1: "));
 }
 
 #[cfg(unix)]

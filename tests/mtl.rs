@@ -100,7 +100,14 @@ fn a_missing_library_is_one_warning() {
     let loaded = load(&folder, &ReadOptions::default());
     assert_eq!(
         warnings(&loaded, folder.path()),
-        ["a.obj: material library `gone.mtl` is not found; its materials are the default"]
+        ["a.obj:1: material library `gone.mtl` is not found; its materials are the default"]
+    );
+    assert_eq!(
+        loaded.missing,
+        [format!(
+            "{}/a.obj:1: material library `gone.mtl` is not found; its materials are the default",
+            folder.path().display()
+        )]
     );
     assert_eq!(loaded.geometry.material_runs.0, [[0, ABSENT]]);
 }
@@ -188,6 +195,19 @@ fn a_texture_is_decoded_once_for_frames_that_follow_one_another() {
         read("plain.obj");
     }
     assert_eq!(read("a.obj").bytes_read, cold.bytes_read);
+}
+
+#[test]
+fn a_material_that_no_library_has_is_missing() {
+    let obj = format!("mtllib a.mtl\n{TRIANGLE}usemtl m\nf 1 2 3\nusemtl n\nf 1 2 3\n");
+    let folder = folder(&[("a.obj", &obj), ("a.mtl", "newmtl m\nd 0\n")]);
+    let loaded = load(&folder, &ReadOptions::default());
+    let told = ["a.obj:7: material `n` is in no library; its faces get the default"];
+    assert_eq!(warnings(&loaded, folder.path()), told);
+    assert_eq!(loaded.missing, told.map(|told| format!("{}/{told}", folder.path().display())));
+    let of_job = MaterialOverride { name: b"n".to_vec(), words: Vec::new(), said_in: "job.yaml".into() };
+    let options = ReadOptions { material_overrides: vec![of_job], ..ReadOptions::default() };
+    assert!(load(&folder, &options).missing.is_empty(), "the job says what it is");
 }
 
 #[test]

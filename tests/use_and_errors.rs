@@ -28,6 +28,8 @@ fn wrong_use_ends_in_2_and_writes_nothing() {
     refused(&input, &["--chunk", "3/2"], "chunk");
     refused(&input, &["--samples=-1"], "1..=65536");
     refused(&input, &["--device", "cpu,"], "no device ``");
+    refused(&input, &["--size", "20000x16", "--format", "webp"], "16384 pixels a side, not 20000x16");
+    refused(&input, &["--frames", "2-1"], "`2-1` ends before it begins; write 1-2");
     std::fs::write(t.join("file"), "kept").unwrap();
     let said = render(t, &input, "file", &[], 2).stderr;
     assert!(said.contains("file"), "{said}");
@@ -75,6 +77,26 @@ fn inspect_goes_on_after_bad_frames_and_tells_costs_by_the_last_good_one() {
     assert!(changes.len() == 3 && changes[0].ends_with("1 added"), "{}", said.stdout);
     assert!(changes[1..].iter().all(|l| l.ends_with("1 deformed")), "{}", said.stdout);
     assert_eq!(lines.iter().filter(|l| **l == "expected, ms").count(), 1, "{}", said.stdout);
+}
+
+#[test]
+fn names_that_no_frame_has_are_warned_of_once() {
+    let t = tempfile::tempdir().unwrap();
+    let t = t.path();
+    let frame = |i: u32, name: &str| format!("usemtl {name}\nv 0 0 0\nv 1 0 0\nv 0 1 {i}\nf 1 2 3\n");
+    for (i, name) in [(1, "Glass"), (2, "Glass"), (3, "Brass")] {
+        std::fs::write(t.join(format!("a_{i}.obj")), frame(i, name)).unwrap();
+    }
+    let job = t.join("j.yaml");
+    let text = "sequence: a_#.obj
+materials: {Glass: {d: 0.5}, Glas: {Kd: 1}}
+overrides: [{frames: 2-3, materials: {Brass: {Kd: 1}}}, {frames: 7, samples: 2}]
+";
+    std::fs::write(&job, text).unwrap();
+    let said = render(t, &job, "out", &["--size", "32x18"], 0).stderr;
+    assert_eq!(said.matches("warning").count(), 2, "{said}");
+    assert!(said.contains("j.yaml: materials: no frame has a material `Glas`;"), "{said}");
+    assert!(said.contains("j.yaml:3: an override is for none of the frames"), "{said}");
 }
 
 #[test]

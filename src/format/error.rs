@@ -8,12 +8,12 @@ use thiserror::Error;
 #[derive(Debug, Error)]
 pub enum FormatError {
     /// The file or its folder cannot be read.
-    #[error("{}: cannot be read: {source}; check that it exists and that its permissions allow reading", path.display())]
+    #[error("{}: cannot be read: {cause}; check that it exists and that its permissions allow reading", path.display())]
     Unreadable {
         /// The file.
         path: PathBuf,
         /// What the system said.
-        source: io::Error,
+        cause: io::Error,
     },
     /// A folder, a pipe or a device stands where a file should.
     #[error("{}: is not a plain file; name an OBJ file", path.display())]
@@ -42,6 +42,24 @@ pub enum FormatError {
     Utf16 {
         /// The file.
         path: PathBuf,
+    },
+    /// An OBJ with a zero byte.
+    #[error("{}:{line}: is binary, not text; export it again, or name an OBJ file", path.display())]
+    Binary {
+        /// The file.
+        path: PathBuf,
+        /// Line of the first zero byte, from 1.
+        line: u32,
+    },
+    /// An OBJ in which nothing is a statement of one.
+    #[error("{}:{line}: is no OBJ: none of its lines is a statement of one, the first is `{statement}`; export it again, or name an OBJ file", path.display())]
+    NoObj {
+        /// The file.
+        path: PathBuf,
+        /// Line of the first statement, from 1.
+        line: u32,
+        /// That line, shortened.
+        statement: String,
     },
     /// A picture that is broken, too large or of no known format.
     #[error("{}: {cause}", path.display())]

@@ -5,11 +5,12 @@ use super::error::FormatError;
 use super::lookup::Lookup;
 use super::material::{FoundMap, material};
 use super::mtl::{self, Given};
-use super::text::{self, Tally, Text, is_blank, shown};
+use super::obj::LineOf;
+use super::text::{self, Tally, Text, is_blank, shown, shown_statement};
 use super::texture::{TextureCache, TextureUse};
 use super::{MaterialOverride, ReadOptions};
 use crate::scene::{Material, Part};
-use crate::warning::Warnings;
+use crate::warning::{Warning, Warnings};
 use std::collections::{BTreeSet, HashMap, HashSet};
 use std::path::{Path, PathBuf};
 
@@ -64,6 +65,8 @@ pub(super) struct Loader<'a> {
     pub bytes_read: u64,
     /// What was named and cannot be had, each as a sentence.
     pub missing: Vec<String>,
+    /// Names that overrides speak of and that are not wanted.
+    pub unmet_overrides: Vec<Vec<u8>>,
 }
 
 impl<'a> Loader<'a> {
@@ -78,6 +81,7 @@ impl<'a> Loader<'a> {
             seen: HashSet::new(),
             bytes_read: 0,
             missing: Vec::new(),
+            unmet_overrides: Vec::new(),
         }
     }
 
@@ -87,11 +91,14 @@ impl<'a> Loader<'a> {
         libraries: &[&[u8]],
         names: impl Iterator<Item = &'n [u8]>,
         textures: &TextureCache,
+        line_of: LineOf<'_>,
         warnings: &mut Warnings,
     ) -> Result<Library, FormatError> {
         let names: HashSet<&[u8]> = names.collect();
         let is_wanted = |name: &[u8]| names.contains(name);
-        self.read_libraries(libraries, &is_wanted, warnings);
+        let spoken_of = self.options.material_overrides.iter().map(|change| &change.name);
+        self.unmet_overrides = spoken_of.filter(|name| !is_wanted(name)).cloned().collect();
+        self.read_libraries(libraries, line_of, &is_wanted, warnings);
         if let Some(file) = &self.options.materials_file {
             let materials = self.read_library(file, &is_wanted, warnings)?;
             self.entries.extend(materials);
@@ -121,6 +128,7 @@ impl<'a> Loader<'a> {
     fn read_libraries(
         &mut self,
         statements: &[&[u8]],
+        line_of: LineOf<'_>,
         is_wanted: &dyn Fn(&[u8]) -> bool,
         warnings: &mut Warnings,
     ) {
@@ -136,12 +144,17 @@ impl<'a> Loader<'a> {
                     return warnings.add(Some(self.obj), None, text);
                 }
                 if let Err(text) = self.read_named(&name, is_wanted, warnings) {
-                    self.missing.push(format!("{}: {text}", self.obj.display()));
-                    warnings.add(Some(self.obj), None, text);
+                    self.misses(self.obj, line_of(b"mtllib", statement), text, warnings);
                     self.incomplete = true;
                 }
             }
         }
+    }
+
+    /// Tells what a file names that cannot be had.
+    fn misses(&mut self, file: &Path, line: Option<u32>, text: String, warnings: &mut Warnings) {
+        warnings.add(Some(file), line, text.clone());
+        self.missing.push(Warning { file: Some(file.to_path_buf()), line, text, count: 1 }.to_string());
     }
 
     /// What stands behind one `mtllib` is one name with blanks if there is such a file, else several.
@@ -193,7 +206,7 @@ impl<'a> Loader<'a> {
             (&parsed.unknown, "unknown statements are skipped"),
             (&parsed.malformed, "statements whose value is not understood are skipped"),
         ] {
-            warn(skipped.tally, format!("{what}, the first is `{}`", shown(&skipped.word)));
+            warn(skipped.tally, format!("{what}, the first is `{}`", shown_statement(&skipped.word)));
         }
         warn(parsed.idle.tally, idle_text(&parsed.idle.words));
         let entry = |given| Entry { given, file: Some(path.to_path_buf()), ..Entry::default() };
@@ -203,7 +216,7 @@ impl<'a> Loader<'a> {
     /// The files behind `mtllib` statements and the options' file, and the maps of all their materials.
     pub(super) fn named_files(mut self, libraries: &[&[u8]]) -> Vec<PathBuf> {
         let mut unheard = Warnings::default();
-        self.read_libraries(libraries, &|_| true, &mut unheard);
+        self.read_libraries(libraries, &|_, _| None, &|_| true, &mut unheard);
         if let Some(file) = &self.options.materials_file {
             let materials = self.read_library(file, &|_| true, &mut unheard).unwrap_or_default();
             self.entries.extend(materials);
@@ -273,8 +286,7 @@ impl<'a> Loader<'a> {
                 Ok(texture) => map.texture = Some(texture),
                 Err(why) => {
                     let text = format!("{} {why}; the constant is used", map.slot.word());
-                    self.missing.push(format!("{}: {text}", map.said_in.display()));
-                    warnings.add(Some(&map.said_in), None, text);
+                    self.misses(&map.said_in, None, text, warnings);
                 }
             }
         }

@@ -27,7 +27,7 @@ use std::sync::Arc;
 pub use error::FormatError;
 pub use gltf::{ClipChoice, Gltf, GltfClips, GltfFrame, GltfOptions, NamedCamera, gltf_clips, is_gltf};
 pub use library::Library;
-pub use mtl::is_mtl_word;
+pub use mtl::{mtl_word_accepts, mtl_word_takes, mtl_words};
 pub use obj::{Parsed, ParsedObj, parse_obj};
 use text::Text;
 pub use texture::{TextureCache, load_picture};
@@ -93,8 +93,10 @@ pub struct Loaded {
     pub parse_ms: f64,
     /// What is wrong but does not stop the frame.
     pub warnings: Warnings,
-    /// Libraries and textures that were named and cannot be had, each as a sentence.
+    /// Libraries, textures and materials that were named and cannot be had, each as a sentence.
     pub missing: Vec<String>,
+    /// Names of materials that the options' overrides speak of and no face has.
+    pub unmet_overrides: Vec<Vec<u8>>,
 }
 
 /// Reads an OBJ and all that it refers to; textures through a cache. Must not be called from a thread of rayon's pool
@@ -142,9 +144,17 @@ pub fn load_obj_stored(
     };
     let mut warnings = stored.warnings(path);
     let mut loader = library::Loader::new(path, options);
-    let library = loader.library(&stored.libraries(), stored.used_materials(), textures, &mut warnings)?;
-    let shape = stored.into_shape(&library, path, &mut warnings);
+    let line_of = |word: &[u8], behind: &[u8]| line_in_file(path, text.as_deref(), word, behind);
+    let library =
+        loader.library(&stored.libraries(), stored.used_materials(), textures, &line_of, &mut warnings)?;
+    let shape = stored.into_shape(&library, path, &line_of, &mut warnings);
     Ok(loaded(ParseKind::Restored, path, digest.1, text, shape, loader, warnings, read_ms, &watch))
+}
+
+/// The line of a statement in a file of which the text may be at hand.
+fn line_in_file(path: &Path, text: Option<&[u8]>, word: &[u8], behind: &[u8]) -> Option<u32> {
+    let read = if text.is_none() { Some(text::read(path).ok()?) } else { None };
+    obj::line_of(&Text::new(text.or(read.as_deref())?, path).ok()?, word, behind)
 }
 
 /// Reads an OBJ in memory and all that it refers to; puts it into a store, where one is given, with whether another
@@ -165,7 +175,9 @@ fn load_text(
     let lines = obj::Lines::new(&text, path, options.lenient, before, &mut warnings)?;
     let said = store.map(|_| lines.said(&warnings));
     let mut loader = library::Loader::new(path, options);
-    let library = loader.library(lines.libraries(), lines.used_materials(), textures, &mut warnings)?;
+    let line_of = |word: &[u8], behind: &[u8]| obj::line_of(&text, word, behind);
+    let library =
+        loader.library(lines.libraries(), lines.used_materials(), textures, &line_of, &mut warnings)?;
     let shape = lines.into_shape(&library, options, &mut warnings);
     if let (Some((store, is_followed)), Some(said)) = (store, said) {
         // of these bytes: the file may have changed since it was looked for
@@ -181,12 +193,13 @@ fn loaded(
     path: &Path,
     length: u64,
     text: Option<Vec<u8>>,
-    shape: obj::Shape,
+    mut shape: obj::Shape,
     loader: library::Loader,
     warnings: Warnings,
     read_ms: f64,
     watch: &Stopwatch,
 ) -> (Loaded, Option<Parsed>) {
+    let missing = loader.missing.into_iter().chain(shape.missing.take()).collect();
     let inputs = std::iter::once(path.to_path_buf()).chain(loader.inputs).collect();
     let (geometry, material_names, parsed) = shape.keep(text);
     let loaded = Loaded {
@@ -198,7 +211,8 @@ fn loaded(
         read_ms,
         parse_ms: watch.ms(),
         warnings,
-        missing: loader.missing,
+        missing,
+        unmet_overrides: loader.unmet_overrides,
     };
     (loaded, parsed)
 }
@@ -212,8 +226,15 @@ pub fn check_obj(path: &Path) -> Result<(), FormatError> {
 
 /// The box of the positions in an OBJ that are finite, as [`load_obj`] gives them; empty where there is none.
 pub fn scan_bounds(path: &Path) -> Result<Bounds, FormatError> {
-    let mut bounds = Bounds::EMPTY;
-    text::read_pieces(path, |text| obj::add_to_bounds(&mut bounds, text))?;
+    let (mut bounds, mut is_binary) = (Bounds::EMPTY, false);
+    text::read_pieces(path, |text| {
+        is_binary |= text.first_zero.is_some();
+        obj::add_to_bounds(&mut bounds, text);
+    })?;
+    if is_binary {
+        // tells the line, which no piece knows
+        check_obj(path)?;
+    }
     Ok(bounds)
 }
 

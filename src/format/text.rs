@@ -3,7 +3,7 @@
 
 use super::error::FormatError;
 use crate::scene::{PartHash, PartHasher};
-use memchr::{memchr_iter, memrchr_iter};
+use memchr::{memchr, memchr_iter, memchr2, memrchr_iter};
 use std::borrow::Cow;
 use std::fs::{self, File};
 use std::io::{self, Read};
@@ -124,8 +124,8 @@ fn continues(bytes: &[u8], end: usize) -> bool {
     bytes[..end].strip_suffix(b"\r").unwrap_or(&bytes[..end]).ends_with(b"\\")
 }
 
-fn unreadable(path: &Path, source: io::Error) -> FormatError {
-    FormatError::Unreadable { path: path.to_path_buf(), source }
+fn unreadable(path: &Path, cause: io::Error) -> FormatError {
+    FormatError::Unreadable { path: path.to_path_buf(), cause }
 }
 
 /// Opens a plain file that is not too long; its length, which may grow.
@@ -156,6 +156,8 @@ pub(super) struct Text<'a> {
     /// Its content with lines joined that `\` continues; as long as what was written, so that a place in one is
     /// the same place in the other.
     pub joined: Cow<'a, [u8]>,
+    /// Where the first zero byte stands: no text has one.
+    pub first_zero: Option<usize>,
 }
 
 impl<'a> Text<'a> {
@@ -174,7 +176,8 @@ impl<'a> Text<'a> {
 
     /// Takes bytes that are text.
     fn of_lines(as_written: &'a [u8]) -> Self {
-        Self { as_written, is_marked: false, joined: join_lines(as_written) }
+        let (joined, first_zero) = join_lines(as_written);
+        Self { as_written, is_marked: false, joined, first_zero }
     }
 
     /// Whether it is the file byte by byte: no line is continued, no byte-order mark taken off.
@@ -201,11 +204,20 @@ fn is_utf16(bytes: &[u8]) -> bool {
 }
 
 /// Blanks out each `\` at the end of a line together with that line end. A comment is not continued: paths of
-/// Windows stand there.
-fn join_lines(bytes: &[u8]) -> Cow<'_, [u8]> {
+/// Windows stand there. On the way the first zero byte is found, which costs nothing beside the search for the others.
+fn join_lines(bytes: &[u8]) -> (Cow<'_, [u8]>, Option<usize>) {
     let mut joined = Cow::Borrowed(bytes);
     let (mut seen, mut in_comment) = (0, false);
-    for at in memchr_iter(b'\\', bytes) {
+    let (mut next, mut first_zero) = (0, None);
+    loop {
+        let rest = &bytes[next..];
+        let found = if first_zero.is_none() { memchr2(b'\\', 0, rest) } else { memchr(b'\\', rest) };
+        let Some(at) = found.map(|found| next + found) else { break };
+        next = at + 1;
+        if bytes[at] == 0 {
+            first_zero = Some(at);
+            continue;
+        }
         let length = match bytes[at + 1..] {
             [b'\r', b'\n', ..] => 3,
             [b'\r' | b'\n', ..] => 2,
@@ -223,7 +235,7 @@ fn join_lines(bytes: &[u8]) -> Cow<'_, [u8]> {
             seen = at + length;
         }
     }
-    joined
+    (joined, first_zero)
 }
 
 /// Where the line that holds `from` ends: the place of its line end, or of the end of the text.
@@ -300,13 +312,27 @@ impl Tally {
     }
 }
 
-/// Bytes for people to read, the first of them where they are many. What would steer a terminal is not shown.
-pub(super) fn shown(bytes: &[u8]) -> String {
-    const MANY: usize = 100;
-    let first = String::from_utf8_lossy(&bytes[..bytes.len().min(MANY)]);
-    let first: String =
-        first.chars().map(|c| if c.is_control() { char::REPLACEMENT_CHARACTER } else { c }).collect();
-    if bytes.len() > MANY { format!("{first}…") } else { first }
+/// A name for people to read, its first bytes where they are many. What would steer a terminal is not shown.
+pub(super) fn shown(name: &[u8]) -> String {
+    shortened(name, 100)
+}
+
+/// A statement or a word of one for people to read: as much of it as tells what it is.
+pub(super) fn shown_statement(statement: &[u8]) -> String {
+    shortened(statement, 40)
+}
+
+/// At most so many bytes; what cannot be shown is one sign, however long it is.
+fn shortened(bytes: &[u8], most: usize) -> String {
+    const NONE: char = char::REPLACEMENT_CHARACTER;
+    let mut short = String::new();
+    for c in String::from_utf8_lossy(&bytes[..bytes.len().min(most)]).chars() {
+        let c = if c.is_control() { NONE } else { c };
+        if c != NONE || !short.ends_with(NONE) {
+            short.push(c);
+        }
+    }
+    if bytes.len() > most { format!("{}…", short.trim_end_matches(NONE)) } else { short }
 }
 
 #[cfg(test)]
@@ -344,6 +370,26 @@ mod tests {
         for plain in [&b""[..], b"v", b"\xEF\xBB\xBFv 1 2 3", b"o \xE6\n", b"\0\0\0\0\0\0"] {
             assert_eq!(refused(plain), None);
         }
+    }
+
+    #[test]
+    fn the_first_zero_byte_is_found_and_lines_are_joined_all_the_same() {
+        let t = text(b"v 1 \\\n2 3\nv\0\0 \\\n1\n");
+        assert_eq!((t.first_zero, &t.joined[..]), (Some(11), &b"v 1   2 3\nv\0\0   1\n"[..]));
+        assert_eq!(text(b"v 1 2 3\n").first_zero, None);
+    }
+
+    #[test]
+    fn what_is_shown_is_short_and_plain() {
+        assert_eq!(shown_statement("é \u{1b}[31m".as_bytes()), "é \u{fffd}[31m");
+        assert_eq!(shown_statement(&[0xff; 30]), "\u{fffd}");
+        assert_eq!(shown_statement(&[b'a'; 41]), format!("{}…", "a".repeat(40)));
+        // cut within a letter of two bytes
+        assert_eq!(
+            shown_statement(&[&[b'a'; 39][..], "éé".as_bytes()].concat()),
+            format!("{}…", "a".repeat(39))
+        );
+        assert_eq!(shown(&[b'a'; 100]), "a".repeat(100));
     }
 
     #[test]

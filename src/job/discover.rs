@@ -64,7 +64,9 @@ pub(super) fn discover(
             return Ok(vec![animation::frames(input, taking, warnings)?]);
         }
         if !is_obj(input) {
-            return Err(JobError::NotAnInput(input.to_path_buf()));
+            let input = input.to_path_buf();
+            let is_job = super::resolve::is_job_file(&input);
+            return Err(if is_job { JobError::JobInJob(input) } else { JobError::NotAnInput(input) });
         }
         vec![input.to_path_buf()]
     } else if let Some(pattern) = pattern_of(input) {
@@ -153,7 +155,7 @@ fn is_obj(path: &Path) -> bool {
 
 /// The plain files of a folder (links to files too) whose names are wanted, hidden ones left out, sorted by name.
 fn list(folder: &Path, wanted: &dyn Fn(&std::ffi::OsStr) -> bool) -> Result<Vec<PathBuf>, JobError> {
-    let unreadable = |source| JobError::Unreadable { path: folder.to_path_buf(), source };
+    let unreadable = |cause| JobError::Unreadable { path: folder.to_path_buf(), cause };
     let mut files = Vec::new();
     for entry in fs::read_dir(folder).map_err(unreadable)? {
         let entry = entry.map_err(unreadable)?;
@@ -176,10 +178,17 @@ fn check_numbers(
 ) -> Result<(), JobError> {
     let numbers: Vec<i64> = sequence.files.iter().filter_map(|f| f.number).collect();
     if let Some(i) = numbers.windows(2).position(|w| w[0] == w[1]) {
-        let name = |k: usize| sequence.files[k].path.clone();
-        return Err(JobError::TwoOfANumber { number: numbers[i], first: name(i), second: name(i + 1) });
+        let [first, second] = [&sequence.files[i], &sequence.files[i + 1]];
+        let remedy = if first.stem == second.stem {
+            "rename one, or use --one-sequence with {frame} in the name (--name)"
+        } else {
+            "remove one, or use --one-sequence"
+        };
+        let (first, second) = (first.path.clone(), second.path.clone());
+        return Err(JobError::TwoOfANumber { number: numbers[i], first, second, remedy });
     }
     // a simulation that writes every tenth step has no gaps; two numbers are not enough to tell
+    let numbers: Vec<i128> = numbers.into_iter().map(i128::from).collect();
     let step = numbers.windows(2).fold(0, |step, w| gcd(step, w[1] - w[0]));
     let step = if numbers.len() > 2 { step } else { 1 };
     let gaps: Vec<String> = numbers
@@ -203,7 +212,7 @@ fn check_numbers(
     Ok(())
 }
 
-fn gcd(a: i64, b: i64) -> i64 {
+fn gcd(a: i128, b: i128) -> i128 {
     if b == 0 { a } else { gcd(b, a % b) }
 }
 
@@ -255,11 +264,19 @@ mod tests {
             discover(folder(&["w_1.obj", "w_3.obj"]).path(), strict, &mut warnings),
             Err(JobError::Gaps { .. })
         ));
+        // numbers as far apart as may be
+        let t2 = folder(&["w_-9223372036854775808.obj", "w_0.obj", "w_9223372036854775807.obj"]);
+        assert!(discover(t2.path(), TAKING, &mut Warnings::default()).is_ok());
         let every_tenth = folder(&["w_10.obj", "w_20.obj", "w_30.obj"]);
         assert!(discover(every_tenth.path(), strict, &mut warnings).is_ok());
         let t = folder(&["w_7.obj", "w_0007.obj", "w_8.obj"]);
         let error = discover(t.path(), TAKING, &mut warnings).unwrap_err().to_string();
         assert!(error.contains("w_7.obj") && error.contains("w_0007.obj"), "{error}");
+        assert!(error.ends_with("remove one, or use --one-sequence"), "{error}");
+        let t = folder(&["w_1.obj", "w_1.OBJ"]);
+        let error = discover(t.path(), TAKING, &mut warnings).unwrap_err().to_string();
+        assert!(error.contains("w_1.obj") && error.contains("w_1.OBJ"), "{error}");
+        assert!(error.contains("--one-sequence with {frame} in the name"), "{error}");
     }
 
     #[test]

@@ -4,6 +4,7 @@ mod animation;
 pub mod auto;
 mod discover;
 mod dropped;
+mod extent;
 mod file;
 mod names;
 pub mod numbers;
@@ -170,19 +171,22 @@ pub enum JobError {
     /// Some other file.
     #[error("{}: is neither a folder nor an .obj, .gltf, .glb, .yaml or .yml file", .0.display())]
     NotAnInput(PathBuf),
+    /// A job file where a sequence should be.
+    #[error("{}: is a job file; a job's sequence is a folder, a pattern, or an .obj, .gltf or .glb file", .0.display())]
+    JobInJob(PathBuf),
     /// A glTF file that cannot be read, or has no such clip.
     #[error(transparent)]
     BadGltf(FormatError),
     /// The system refuses.
-    #[error("{}: cannot be read: {source}; check that it exists and that its permissions allow reading", path.display())]
+    #[error("{}: cannot be read: {cause}; check that it exists and that its permissions allow reading", path.display())]
     Unreadable {
         /// File or folder.
         path: PathBuf,
         /// What the system said.
-        source: io::Error,
+        cause: io::Error,
     },
     /// Two files for one frame.
-    #[error("frame {number} is given twice: {} and {}; remove one, or use --one-sequence", first.display(), second.display())]
+    #[error("frame {number} is given twice: {} and {}; {remedy}", first.display(), second.display())]
     TwoOfANumber {
         /// The frame.
         number: i64,
@@ -190,6 +194,8 @@ pub enum JobError {
         first: PathBuf,
         /// The other.
         second: PathBuf,
+        /// What to do.
+        remedy: &'static str,
     },
     /// `--strict` and frames are missing.
     #[error("{}: {text} (--strict)", input.display())]
@@ -203,8 +209,17 @@ pub enum JobError {
     #[error("frame {0} was asked for and no sequence has it; `rentix inspect` shows the frames")]
     NoSuchFrame(i64),
     /// Two frames of a sequence would write one picture.
-    #[error("two frames would both be written to {}; put {{stem}} or {{frame}} into the name", .0.display())]
-    TwoOfAName(PathBuf),
+    #[error("{first} and {second} would both be written to {}; {remedy}", picture.display())]
+    TwoOfAName {
+        /// One frame.
+        first: String,
+        /// The other.
+        second: String,
+        /// The picture.
+        picture: PathBuf,
+        /// What to do.
+        remedy: &'static str,
+    },
     /// The job file is wrong.
     #[error("{}{place}: {text}", path.display())]
     File {

@@ -3,9 +3,6 @@
 use std::cmp::Ordering;
 use std::collections::BTreeMap;
 
-/// Longest run that counts as a number; a longer one is text.
-const MAX_DIGITS: usize = 15;
-
 /// A name cut into text and numbers: `walk_007` is `walk_`, 7, and an empty text.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct Name {
@@ -18,7 +15,7 @@ pub(super) struct Name {
 
 impl Name {
     /// Cuts the bytes of a stem. A minus is a sign where a number and no letter or digit stands beside it: `walk_-5`
-    /// has −5, `horse-01` has 1.
+    /// has −5, `horse-01` has 1. A run of digits beyond 64 bits is text.
     pub(super) fn of(stem: &[u8]) -> Self {
         let mut name = Self { texts: Vec::new(), numbers: Vec::new(), written: Vec::new() };
         let mut text_start = 0;
@@ -29,14 +26,13 @@ impl Name {
                 continue;
             }
             let digits_end = i + stem[i..].iter().take_while(|b| b.is_ascii_digit()).count();
-            if digits_end - i <= MAX_DIGITS {
-                let is_signed =
-                    i > text_start && stem[i - 1] == b'-' && (i < 2 || !stem[i - 2].is_ascii_alphanumeric());
-                let magnitude = stem[i..digits_end].iter().fold(0, |n, b| n * 10 + i64::from(b - b'0'));
+            let is_signed =
+                i > text_start && stem[i - 1] == b'-' && (i < 2 || !stem[i - 2].is_ascii_alphanumeric());
+            if let Some(number) = number(&stem[i..digits_end], is_signed) {
                 let start = i - usize::from(is_signed);
                 name.texts.push(stem[text_start..start].to_vec());
                 name.written.push(stem[start..digits_end].to_vec());
-                name.numbers.push(if is_signed { -magnitude } else { magnitude });
+                name.numbers.push(number);
                 text_start = digits_end;
             }
             i = digits_end;
@@ -74,6 +70,14 @@ impl Name {
         }
         bytes
     }
+}
+
+/// The number that digits are, where 64 bits hold it.
+fn number(digits: &[u8], is_negative: bool) -> Option<i64> {
+    digits.iter().try_fold(0_i64, |n, &b| {
+        let digit = i64::from(b - b'0');
+        n.checked_mul(10)?.checked_add(if is_negative { -digit } else { digit })
+    })
 }
 
 /// Names that belong to one sequence: their places in the list that was grouped, with their frame numbers.
@@ -163,7 +167,16 @@ mod tests {
         assert_eq!(last(b"-3"), Some(-3));
         assert_eq!(last(b"horse-01"), Some(1));
         assert_eq!(last(b"2024-05"), Some(5));
-        assert_eq!(last(b"a1234567890123456789"), None);
+        assert_eq!(last(b"sim_20240101123045123"), Some(20_240_101_123_045_123));
+        assert_eq!(last(b"a9223372036854775807"), Some(i64::MAX));
+        assert_eq!(last(b"a_-9223372036854775808"), Some(i64::MIN));
+        assert_eq!(last(b"a0000000000000000000000007"), Some(7));
+        assert_eq!(last(b"a9223372036854775808"), None);
+        assert_eq!(last(b"7_a9223372036854775808"), Some(7));
+        assert_eq!(
+            groups(&["sim_20240101123045124", "sim_20240101123045123"]),
+            [one("sim", &[20_240_101_123_045_123, 20_240_101_123_045_124])]
+        );
     }
 
     #[test]

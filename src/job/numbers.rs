@@ -1,6 +1,7 @@
 //! Frame numbers as they are typed: `--frames`, `--chunk`, `--order`.
 
 use std::fmt;
+use std::num::{IntErrorKind, ParseIntError};
 use std::ops::Range;
 use std::str::FromStr;
 
@@ -22,7 +23,7 @@ impl FrameSet {
         let mut runs: Vec<Run> = Vec::new();
         for &n in numbers {
             match runs.last_mut() {
-                Some(run) if run.last + 1 == n => run.last = n,
+                Some(run) if run.last.checked_add(1) == Some(n) => run.last = n,
                 _ => runs.push(Run { first: n, last: n, step: 1 }),
             }
         }
@@ -31,12 +32,14 @@ impl FrameSet {
 
     /// Whether a number is in it.
     pub fn contains(&self, number: i64) -> bool {
-        self.0.iter().any(|r| (r.first..=r.last).contains(&number) && (number - r.first) % r.step == 0)
+        let is_step = |r: &Run| (i128::from(number) - i128::from(r.first)) % i128::from(r.step) == 0;
+        self.0.iter().any(|r| (r.first..=r.last).contains(&number) && is_step(r))
     }
 
     /// How many numbers its runs have; what stands in several counts each time.
     pub fn len(&self) -> u64 {
-        self.0.iter().map(|r| ((r.last - r.first) / r.step) as u64 + 1).fold(0, u64::saturating_add)
+        let count = |r: &Run| (i128::from(r.last) - i128::from(r.first)) / i128::from(r.step) + 1;
+        self.0.iter().map(|r| u64::try_from(count(r)).unwrap_or(u64::MAX)).fold(0, u64::saturating_add)
     }
 
     /// Whether it holds none; a set that was typed never does.
@@ -57,7 +60,7 @@ impl FrameSet {
         let missing = |r: &Run| {
             let mut at = r.first;
             while at <= r.last && numbers.binary_search(&at).is_ok() {
-                at = at.saturating_add(r.step);
+                at = at.checked_add(r.step)?;
             }
             (at <= r.last).then_some(at)
         };
@@ -85,20 +88,21 @@ impl FromStr for FrameSet {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        text.split(',')
-            .map(|part| {
-                run(part.trim()).ok_or_else(|| {
-                    format!("`{part}` is not a frame number or range; write 1-100, 1-100x2 or 5,7,9-12")
-                })
-            })
-            .collect::<Result<_, _>>()
-            .map(Self)
+        let parts = text.split(',').map(|part| match part.trim() {
+            "" if text.contains(',') => Err(format!("`{text}`: nothing stands before or behind a comma")),
+            part => run(part).map_err(|why| format!("`{part}` {why}")),
+        });
+        parts.collect::<Result<_, _>>().map(Self)
     }
 }
 
-fn run(text: &str) -> Option<Run> {
+/// One part between commas; else what is wrong with it.
+fn run(text: &str) -> Result<Run, String> {
     let (range, step) = match text.split_once(['x', ':']) {
-        Some((range, step)) => (range, step.parse().ok().filter(|s| *s > 0)?),
+        Some((range, step)) => {
+            let step = step.parse().ok().filter(|s| *s > 0);
+            (range, step.ok_or("has a step that is no whole number of 1 or more; write 1-100x2")?)
+        }
         None => (text, 1),
     };
     // the dash of a range stands behind a digit, that of a negative number does not
@@ -106,12 +110,25 @@ fn run(text: &str) -> Option<Run> {
         .bytes()
         .enumerate()
         .position(|(i, b)| b == b'-' && i > 0 && range.as_bytes()[i - 1].is_ascii_digit());
-    let number = |s: &str| s.parse::<i64>().ok().filter(|n| n.abs() < 1 << 53);
     let (first, last) = match dash {
         Some(i) => (number(&range[..i])?, number(&range[i + 1..])?),
         None => (number(range)?, number(range)?),
     };
-    (first <= last).then_some(Run { first, last, step })
+    if first > last {
+        return Err(format!(
+            "ends before it begins; write {last}-{first} (--order reverse takes the last frame first)"
+        ));
+    }
+    Ok(Run { first, last, step })
+}
+
+fn number(text: &str) -> Result<i64, String> {
+    text.parse().map_err(|e: ParseIntError| match e.kind() {
+        IntErrorKind::PosOverflow | IntErrorKind::NegOverflow => {
+            format!("is beyond the numbers that frames may have, {} to {}", i64::MIN, i64::MAX)
+        }
+        _ => "is not a frame number or range; write 1-100, 1-100x2 or 5,7,9-12".to_string(),
+    })
 }
 
 /// The I-th of N runs of consecutive frames.
@@ -205,6 +222,35 @@ mod tests {
         for bad in ["", "a", "1-", "5-1", "1-9x0", "1,,2", "1-9x-2", "99999999999999999999"] {
             assert!(bad.parse::<FrameSet>().is_err(), "{bad}");
         }
+    }
+
+    #[test]
+    fn what_is_wrong_with_a_set_is_told() {
+        for (bad, told) in [
+            ("3-1", "`3-1` ends before it begins; write 1-3"),
+            ("1-3,", "`1-3,`: nothing stands before or behind a comma"),
+            (",5", "`,5`: nothing"),
+            ("2,1-9x0", "`1-9x0` has a step"),
+            ("1,a", "`a` is not a frame number or range"),
+            ("1-99999999999999999999", "is beyond the numbers"),
+            ("", "`` is not a frame number"),
+        ] {
+            let error = bad.parse::<FrameSet>().unwrap_err();
+            assert!(error.starts_with(told) || error.contains(told), "{bad}: {error}");
+        }
+    }
+
+    #[test]
+    fn numbers_are_all_of_64_bits() {
+        let all: FrameSet = "-9223372036854775808-9223372036854775807".parse().unwrap();
+        assert_eq!(all.len(), u64::MAX);
+        assert!(all.contains(i64::MIN) && all.contains(i64::MAX));
+        let last = FrameSet::from_numbers(&[i64::MAX - 1, i64::MAX]);
+        assert_eq!(last.to_string(), "9223372036854775806-9223372036854775807");
+        assert_eq!(last.first_not_in(&[i64::MAX - 1, i64::MAX]), None);
+        assert_eq!(last.iter().collect::<Vec<_>>(), [i64::MAX - 1, i64::MAX]);
+        let time: FrameSet = "20240101123045123".parse().unwrap();
+        assert!(time.contains(20_240_101_123_045_123) && !time.contains(20_240_101_123_045_124));
     }
 
     #[test]

@@ -146,8 +146,6 @@ pub mod limits {
     pub const U32: RangeInclusive<f64> = 0.0..=4_294_967_295.0;
     /// Half angles of a spot light's cone, degrees.
     pub const HALF_ANGLE: RangeInclusive<f64> = 0.0..=90.0;
-    /// Frame numbers.
-    pub const FRAME: RangeInclusive<f64> = -9.0e15..=9.0e15;
     /// Frames a second.
     pub const FPS: RangeInclusive<f64> = 0.001..=1_000.0;
     /// Bits a channel.

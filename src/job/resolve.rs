@@ -6,8 +6,8 @@ use super::dropped;
 use super::file::{self, JobFile, LayerFile, Outside, Override};
 use super::template::{Fill, fill};
 use super::{
-    FrameFile, FrameSet, Job, JobError, Layer, MAX_FRAMES, Options, Picture, Request, Sequence, Settings,
-    Source, main_file,
+    FrameFile, Job, JobError, Layer, MAX_FRAMES, Options, Picture, Request, Sequence, Settings, Source,
+    main_file, settings,
 };
 use crate::format::ClipChoice;
 use crate::warning::Warnings;
@@ -69,8 +69,9 @@ pub fn resolve(request: &Request) -> Result<Job, JobError> {
     }
     let name = name.unwrap_or_default();
 
+    job.warn_of_what_is_for_nothing(&job_file);
     job.place_in_folders();
-    job.choose(job_file.frames.as_ref())?;
+    job.choose(&job_file)?;
     job.inputs.extend(
         job.sequences
             .iter()
@@ -94,7 +95,7 @@ pub fn resolve(request: &Request) -> Result<Job, JobError> {
     })
 }
 
-fn is_job_file(path: &Path) -> bool {
+pub(super) fn is_job_file(path: &Path) -> bool {
     let is_yaml = |e: &std::ffi::OsStr| e.eq_ignore_ascii_case("yaml") || e.eq_ignore_ascii_case("yml");
     path.extension().is_some_and(is_yaml) && !path.is_dir()
 }
@@ -183,8 +184,8 @@ impl Resolving<'_> {
                 .enumerate()
                 .map(|(layer, (l, given))| Source {
                     layer,
-                    file: layer_file(&l.files, given, frame - first),
-                    transform: l.placed.as_ref().map(|p| p.at(frame as f64)),
+                    file: layer_file(&l.files, given, i128::from(frame) - i128::from(first)),
+                    transform: l.placed.as_ref().map(|p| p.at(frame)),
                 })
                 .collect();
             let shown = sources.iter().zip(&layers).filter_map(|(s, l)| Some(l.files[s.file?].stem.as_str()));
@@ -232,6 +233,15 @@ impl Resolving<'_> {
         if !is_dropped {
             options.lay_over(&self.request.options);
         }
+        if let Err(text) = settings::check_bits(&options) {
+            let of_override = applying.iter().rev().find_map(|&i| job.overrides[i].bits_at.as_ref());
+            let place = of_override.or(job.bits_at.as_ref());
+            let is_typed = self.request.options.bits.is_some() && !is_dropped;
+            return Err(match place.filter(|_| !is_typed) {
+                Some(place) => job.wrong(place, format!("bits: {text}")),
+                None => JobError::Options(text),
+            });
+        }
         let mut settings = Settings::new(&options).map_err(JobError::Options)?;
         settings.read.within.clone_from(&self.request.dropped);
         let settings = Arc::new(settings);
@@ -240,6 +250,27 @@ impl Resolving<'_> {
         }
         self.settings.insert(applying, Arc::clone(&settings));
         Ok(settings)
+    }
+
+    /// Overrides that are for none of the frames, and a clip where nothing has one.
+    fn warn_of_what_is_for_nothing(&mut self, job: &JobFile) {
+        let applied: HashSet<usize> = self.settings.keys().flatten().copied().collect();
+        // frames that an override is for may come yet
+        let idle = (0..job.overrides.len()).filter(|i| !applied.contains(i) && !self.request.grows);
+        for i in idle {
+            let text = "an override is for none of the frames; check its `frames` and `files`";
+            self.warnings.add(Some(job.path()), Some(job.overrides[i].line), text);
+        }
+        let mut files = self.sequences.iter().flat_map(|s| &s.layers).flat_map(|l| &l.files);
+        if files.any(|f| f.moment.is_some()) {
+            return;
+        }
+        if job.clip != ClipChoice::Auto {
+            let text = "`clip` is for glTF files and there is none; it changes nothing";
+            self.warnings.add(Some(job.path()), None, text);
+        } else if self.request.clip.is_some() && self.request.dropped.is_none() {
+            self.warnings.add(None, None, "--clip is for glTF files and there is none; it changes nothing");
+        }
     }
 
     /// Where several sequences would write one name, each gets a folder of its own.
@@ -267,25 +298,54 @@ impl Resolving<'_> {
 
     /// `--frames`, else the job's, then `--chunk`, then `--order`. Names are compared before the chunk is taken: all
     /// chunks write into one folder.
-    fn choose(&mut self, of_job: Option<&FrameSet>) -> Result<(), JobError> {
+    fn choose(&mut self, job: &JobFile) -> Result<(), JobError> {
         let typed = self.request.frames.as_ref();
-        if let Some(set) = if self.request.dropped.is_some() { of_job.or(typed) } else { typed.or(of_job) } {
+        let of_job = job.frames.as_ref();
+        let job_wins = of_job.is_some() && (self.request.dropped.is_some() || typed.is_none());
+        if let Some(set) = if job_wins { of_job } else { typed } {
             let mut numbers: Vec<i64> = self.pictures.iter().filter_map(|p| p.frame).collect();
             numbers.sort_unstable();
             if let Some(missing) = set.first_not_in(&numbers).filter(|_| !self.request.grows) {
-                return Err(JobError::NoSuchFrame(missing));
+                let error = JobError::NoSuchFrame(missing);
+                return Err(if job_wins {
+                    job.wrong(&job.frames_at, format!("frames: {error}"))
+                } else {
+                    error
+                });
             }
             self.pictures.retain(|p| p.frame.is_some_and(|f| set.contains(f)));
         }
-        let mut seen = HashSet::new();
-        if let Some(twice) = self.pictures.iter().find(|p| !seen.insert(&p.picture)) {
-            return Err(JobError::TwoOfAName(twice.picture.clone()));
+        let mut seen: HashMap<&Path, &Picture> = HashMap::new();
+        for second in &self.pictures {
+            if let Some(first) = seen.insert(&second.picture, second) {
+                return Err(self.two_of_a_name(first, second));
+            }
         }
         if let Some(chunk) = self.request.chunk {
             self.pictures = self.pictures[chunk.range(self.pictures.len())].to_vec();
         }
         self.request.order.apply(&mut self.pictures);
         Ok(())
+    }
+
+    /// Names both frames and what would part them.
+    fn two_of_a_name(&self, first: &Picture, second: &Picture) -> JobError {
+        let file = |p: &Picture| p.main_file(&self.sequences[p.sequence]).cloned();
+        let (files, frames) = ([file(first), file(second)], [first.frame, second.frame]);
+        let named = |i: usize| match (&files[i], frames[i]) {
+            (Some(file), _) if files[0] != files[1] => file.path.display().to_string(),
+            (_, Some(frame)) => format!("frame {frame}"),
+            _ => "a frame".to_string(),
+        };
+        let stems = files.each_ref().map(|file| file.as_ref().map(|f| &f.stem));
+        let remedy = if stems[0] != stems[1] {
+            "put {stem} or {frame} into the name"
+        } else if frames[0] != frames[1] {
+            "put {frame} into the name"
+        } else {
+            "rename one, or use --one-sequence with {frame} in the name (--name)"
+        };
+        JobError::TwoOfAName { first: named(0), second: named(1), picture: second.picture.clone(), remedy }
     }
 }
 
@@ -312,10 +372,11 @@ fn layer_frames(layers: &[Layer], job: &JobFile) -> Vec<i64> {
 
 /// The file that a layer shows so many frames after the job's first one (CONTRACT 3: start + step · offset, in a gap
 /// the last one before).
-fn layer_file(files: &[FrameFile], given: &LayerFile, offset: i64) -> Option<usize> {
-    let number = |f: &FrameFile| f.number.unwrap_or(0);
+fn layer_file(files: &[FrameFile], given: &LayerFile, offset: i128) -> Option<usize> {
+    let number = |f: &FrameFile| i128::from(f.number.unwrap_or(0));
     let (first, last) = (number(files.first()?), number(files.last()?));
-    let mut wanted = given.start.unwrap_or(first).saturating_add(given.step.saturating_mul(offset));
+    let steps = i128::from(given.step).saturating_mul(offset);
+    let mut wanted = given.start.map_or(first, i128::from).saturating_add(steps);
     if !(first..=last).contains(&wanted) {
         wanted = match given.outside {
             Outside::Hold => wanted.clamp(first, last),

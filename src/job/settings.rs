@@ -1,5 +1,6 @@
 //! The settings of one picture: every option with its default filled in.
 
+use super::extent;
 use super::options::{Background, CameraChoice, LightChoice, Options, limits};
 use super::track::{CameraPose, CameraTrack, Interpolation, Key};
 use super::words::{listed, nearest, one_of};
@@ -84,10 +85,10 @@ impl Settings {
     /// Fills in what the options leave open.
     pub fn new(options: &Options) -> Result<Self, String> {
         let o = options.clone();
+        check_bits(&o)?;
         let format = o.format.clone().unwrap_or_else(|| FORMATS[0].to_string());
-        if o.bits == Some(16) && !SIXTEEN_BITS.contains(&&*format) && !FLOATS.contains(&&*format) {
-            return Err(format!("{format} has 8 bits a channel; 16 have {}", SIXTEEN_BITS.join(", ")));
-        }
+        let size = o.size.unwrap_or([1280, 720]);
+        extent::check(&format, size, o.bits.unwrap_or(8), o.alpha.unwrap_or(false))?;
         let read = ReadOptions {
             smooth_angle_deg: o.smooth_angle,
             mtl_srgb: o.mtl_srgb.unwrap_or(false),
@@ -101,7 +102,7 @@ impl Settings {
             fov_deg: o.fov.unwrap_or(40.0),
             ambient: o.ambient.unwrap_or(Vec3::splat(0.1)),
             background: o.background.unwrap_or(Background::Color(Vec3::ZERO)),
-            size: o.size.unwrap_or([1280, 720]),
+            size,
             samples: o.samples.unwrap_or(1),
             filter: o.filter.unwrap_or_default(),
             depth: o.depth.unwrap_or(10),
@@ -151,7 +152,7 @@ impl Settings {
     pub fn camera_at(&self, frame: Option<i64>) -> Option<Camera> {
         match &self.camera {
             CameraChoice::Auto | CameraChoice::Gltf { .. } => None,
-            CameraChoice::Given(track) => track.at(frame.unwrap_or(0) as f64, self.up, self.fov_deg),
+            CameraChoice::Given(track) => track.at(frame.unwrap_or(0), self.up, self.fov_deg),
         }
     }
 
@@ -159,6 +160,15 @@ impl Settings {
     pub fn aspect(&self) -> f64 {
         f64::from(self.size[0]) / f64::from(self.size[1])
     }
+}
+
+/// Whether the format has the bits a channel that are asked for.
+pub(super) fn check_bits(o: &Options) -> Result<(), String> {
+    let format = o.format.as_deref().unwrap_or(FORMATS[0]);
+    if o.bits == Some(16) && !SIXTEEN_BITS.contains(&format) && !FLOATS.contains(&format) {
+        return Err(format!("{format} has 8 bits a channel; 16 have {}", SIXTEEN_BITS.join(", ")));
+    }
+    Ok(())
 }
 
 /// The camera with what was given apart from it (`--eye`, `--look-at`, `--up`, `--fov`) laid over.
@@ -172,7 +182,7 @@ fn camera(o: &Options) -> Result<CameraChoice, String> {
             (None, None) => return Ok(CameraChoice::Auto),
             (Some(eye), Some(look_at)) => {
                 let value = CameraPose { eye, look_at, up: None, fov_deg: None };
-                let keys = vec![Key { frame: 0.0, value }];
+                let keys = vec![Key { frame: 0, value }];
                 choice = CameraChoice::Given(CameraTrack { keys, interpolation: Interpolation::Linear });
             }
             (Some(_), None) => return Err("--eye needs --look-at beside it".to_string()),
@@ -311,7 +321,7 @@ mod tests {
     fn a_camera_from_the_command_line_is_laid_over_that_of_the_job() {
         let pose = CameraPose { eye: DVec3::X, look_at: DVec3::ZERO, up: None, fov_deg: Some(30.0) };
         let track =
-            CameraTrack { keys: vec![Key { frame: 0.0, value: pose }], interpolation: Interpolation::Linear };
+            CameraTrack { keys: vec![Key { frame: 0, value: pose }], interpolation: Interpolation::Linear };
         let o =
             Options { camera: Some(CameraChoice::Given(track)), eye: Some(DVec3::Y), ..Options::default() };
         let camera = Settings::new(&o).unwrap().camera_at(Some(3)).unwrap();
@@ -343,6 +353,9 @@ mod tests {
         };
         assert!(clear("webp").is_none() && Settings::new(&Options::default()).unwrap().left_out().is_none());
         assert!(clear("jpg").unwrap().starts_with("jpg has no alpha"));
+        let wide =
+            Options { format: Some("webp".to_string()), size: Some([20_000, 16]), ..Options::default() };
+        assert!(Settings::new(&wide).unwrap_err().contains("16384 pixels a side"));
         assert!(sixteen("jp2") && sixteen("exr") && !sixteen("bmp"));
     }
 }

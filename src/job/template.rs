@@ -8,6 +8,11 @@ pub(super) struct Fill<'a> {
     pub(super) frame: Option<i64>,
 }
 
+/// Whether a template can be filled where a frame has a number.
+pub(super) fn check(template: &str) -> Result<(), String> {
+    fill(template, Fill { stem: "stem", name: "name", frame: Some(0) }).map(drop)
+}
+
 /// Fills a template; an error says which placeholder is wrong.
 pub(super) fn fill(template: &str, with: Fill<'_>) -> Result<String, String> {
     let mut out = String::new();
@@ -65,8 +70,8 @@ mod tests {
         assert_eq!(filled("{name}_{frame:04}.{frame}"), "walk_0007.7");
         assert_eq!(fill("{frame:03}", Fill { frame: Some(-5), ..with }).unwrap(), "-005");
         for bad in ["{frme}", "{frame", "{frame:x}", "../{stem}", "", "a//b"] {
-            assert!(fill(bad, with).is_err(), "{bad}");
+            assert!(fill(bad, with).is_err() && check(bad).is_err(), "{bad}");
         }
-        assert!(fill("{frame}", Fill { frame: None, ..with }).is_err());
+        assert!(fill("{frame}", Fill { frame: None, ..with }).is_err() && check("{frame}").is_ok());
     }
 }

@@ -57,7 +57,47 @@ fn sequences_that_would_write_one_name_get_folders() {
     let request = Request { options: named("{name}.{frame}"), ..t.request(&["d"]) };
     assert_eq!(pictures(&resolve(&request).unwrap()), ["a.1.png", "a.2.png", "b_1.1.png"]);
     let request = Request { options: named("one"), ..t.request(&["d"]) };
-    assert!(error(&request).contains("one.png"), "{}", error(&request));
+    for word in ["one.png", "a_1.obj", "a_2.obj", "put {stem} or {frame}"] {
+        assert!(error(&request).contains(word), "{word}: {}", error(&request));
+    }
+    // the same stem, so that only the number parts them, or nothing does
+    let t = Folder::with(&["d/w_1.obj", "d/w_1.OBJ", "e/a.obj", "e/a.OBJ"]);
+    let request = Request { one_sequence: true, ..t.request(&["d"]) };
+    let told = error(&request);
+    assert!(["w_1.obj", "w_1.OBJ", "put {frame} into"].iter().all(|w| told.contains(w)), "{told}");
+    assert_eq!(resolve(&Request { options: named("{stem}.{frame}"), ..request }).unwrap().pictures.len(), 2);
+    let told = error(&t.request(&["e"]));
+    assert!(["a.obj", "a.OBJ", "rename one"].iter().all(|w| told.contains(w)), "{told}");
+}
+
+#[test]
+fn what_is_for_nothing_is_warned_of() {
+    let t = Folder::with(&["w/a_1.obj", "w/a_2.obj"]);
+    t.write(
+        "j.yaml",
+        "sequence: w
+clip: Walk
+overrides:
+  - {frames: 2, samples: 2}
+  - {frames: 99, samples: 4}
+  - {files: 'zz*', samples: 4}
+",
+    );
+    let told = |request: &Request| -> Vec<String> {
+        let warnings = resolve(request).unwrap().warnings.list();
+        let folder = format!("{}/", t.0.path().display());
+        warnings.iter().map(|w| w.to_string().replace(&folder, "")).collect()
+    };
+    let clip = "j.yaml: `clip` is for glTF files and there is none; it changes nothing";
+    let idle = "j.yaml:5: an override is for none of the frames; check its `frames` and `files` (2 times)";
+    assert_eq!(told(&t.request(&["j.yaml"])), [clip, idle]);
+    // frames that are not chosen are there all the same
+    let first = Request { frames: Some("1".parse().unwrap()), ..t.request(&["j.yaml"]) };
+    assert_eq!(told(&first), [clip, idle]);
+    assert_eq!(told(&Request { grows: true, ..first }), [clip]);
+    let typed = Request { clip: Some(ClipChoice::from_word("Walk")), ..t.request(&["w"]) };
+    assert_eq!(told(&typed), ["--clip is for glTF files and there is none; it changes nothing"]);
+    assert_eq!(told(&t.request(&["w"])), [""; 0]);
 }
 
 #[test]
@@ -166,6 +206,25 @@ overrides:
     assert_eq!(resolve(&t.request(&["j.yaml"])).unwrap().pictures.len(), 3);
 }
 
+#[test]
+fn files_named_by_their_time_are_frames() {
+    let t = Folder::with(&["w/s_20240101123045122.obj", "w/s_20240101123045123.obj"]);
+    t.write(
+        "j.yaml",
+        "layers: [{sequence: w, frames: {start: 20240101123045123}}]\nframes: 20240101123045121\n",
+    );
+    let job = resolve(&t.request(&["j.yaml"])).unwrap();
+    assert_eq!(pictures(&job), ["j_20240101123045121.png"]);
+    assert_eq!(job.pictures[0].sources[0].file, Some(1));
+    let typed = |frames: &str| Request { frames: Some(frames.parse().unwrap()), ..t.request(&["w"]) };
+    assert_eq!(pictures(&resolve(&typed("20240101123045123")).unwrap()), ["s_20240101123045123.png"]);
+    assert!(error(&typed("20240101123045124")).contains("frame 20240101123045124 "));
+    // the ends of 64 bits
+    let t = Folder::with(&["w/a_-9223372036854775808.obj", "w/a_9223372036854775807.obj"]);
+    t.write("j.yaml", "layers: [{sequence: w, frames: {step: -9223372036854775808, outside: loop}}]\n");
+    assert_eq!(resolve(&t.request(&["j.yaml"])).unwrap().pictures.len(), 2);
+}
+
 #[cfg(target_os = "linux")]
 #[test]
 fn names_may_be_any_bytes() {
@@ -187,7 +246,22 @@ fn wrong_use_is_refused() {
     assert!(error(&t.request(&["a.yaml", "c.yaml"])).contains("more than one job file"));
     assert!(error(&t.request(&["b.yaml"])).contains("b.yaml:2:1: unknown key `sise`"));
     assert!(error(&t.request(&["c.yaml", "w"])).contains("layers"));
+    for (yaml, told) in [
+        ("frames: 9", "f.yaml:2:9: frames: frame 9 "),
+        ("output: {bits: 16, format: jpg}", "f.yaml:2:16: bits: jpg has 8 bits"),
+        ("output: {format: jpg}\noverrides: [{frames: 1, bits: 16}]", "f.yaml:3:31: bits: jpg has 8 bits"),
+    ] {
+        t.write("f.yaml", &format!("sequence: w\n{yaml}\n"));
+        assert!(error(&t.request(&["f.yaml"])).contains(told), "{}", error(&t.request(&["f.yaml"])));
+    }
+    // what is typed is not the job's
+    let typed = Options { bits: Some(16), ..Options::default() };
+    let request = Request { options: typed, ..t.request(&["f.yaml"]) };
+    assert!(error(&request).starts_with("jpg has 8 bits"), "{}", error(&request));
     t.write("e.yaml", "sequence: w\nfilter: \"\\e[31m\"\n");
     assert!(!error(&t.request(&["e.yaml"])).contains('\u{1b}'));
-    assert!(error(&t.request(&["d.yaml"])).contains("d.yaml"));
+    let told = error(&t.request(&["d.yaml"]));
+    assert!(told.contains("d.yaml") && told.matches("o such file").count() == 1, "{told}");
+    t.write("g.yaml", "sequence: c.yaml\n");
+    assert!(error(&t.request(&["g.yaml"])).contains("c.yaml: is a job file; a job's sequence is"));
 }

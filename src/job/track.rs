@@ -18,7 +18,7 @@ pub enum Interpolation {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Key<T> {
     /// The frame.
-    pub frame: f64,
+    pub frame: i64,
     /// The value.
     pub value: T,
 }
@@ -29,21 +29,26 @@ trait Mix: Copy {
 }
 
 /// The value at a frame; keys are in the order of their frames and there is at least one.
-fn at<T: Mix>(keys: &[Key<T>], frame: f64, interpolation: Interpolation) -> Option<T> {
+fn at<T: Mix>(keys: &[Key<T>], frame: i64, interpolation: Interpolation) -> Option<T> {
     let after = keys.iter().position(|k| k.frame > frame).unwrap_or(keys.len());
     let before = keys.get(after.checked_sub(1)?.min(keys.len()))?;
     Some(match keys.get(after) {
         None => before.value,
         Some(next) => {
-            let x = (frame - before.frame) / (next.frame - before.frame);
+            let x = frames_between(before.frame, frame) / frames_between(before.frame, next.frame);
             let x = if interpolation == Interpolation::Smooth { x * x * (3.0 - 2.0 * x) } else { x };
             before.value.mix(next.value, x)
         }
     })
 }
 
+/// How many frames there are from one to another; each may be any of 64 bits.
+fn frames_between(from: i64, to: i64) -> f64 {
+    (i128::from(to) - i128::from(from)) as f64
+}
+
 /// The value at a frame, the first key's before it.
-fn held<T: Mix>(keys: &[Key<T>], frame: f64, interpolation: Interpolation) -> Option<T> {
+fn held<T: Mix>(keys: &[Key<T>], frame: i64, interpolation: Interpolation) -> Option<T> {
     at(keys, frame, interpolation).or_else(|| keys.first().map(|k| k.value))
 }
 
@@ -83,7 +88,7 @@ pub struct CameraTrack {
 
 impl CameraTrack {
     /// The camera at a frame, with what it leaves open filled in.
-    pub fn at(&self, frame: f64, up: DVec3, fov_deg: f64) -> Option<Camera> {
+    pub fn at(&self, frame: i64, up: DVec3, fov_deg: f64) -> Option<Camera> {
         let pose = held(&self.keys, frame, self.interpolation)?;
         Some(Camera {
             eye: pose.eye,
@@ -141,7 +146,7 @@ pub struct Placed {
 
 impl Placed {
     /// World from object at a frame.
-    pub fn at(&self, frame: f64) -> DAffine3 {
+    pub fn at(&self, frame: i64) -> DAffine3 {
         held(&self.keys, frame, Interpolation::Linear).unwrap_or_default().matrix()
     }
 
@@ -176,15 +181,21 @@ mod tests {
         let pose =
             |x: f64, fov| CameraPose { eye: DVec3::X * x, look_at: DVec3::ZERO, up: None, fov_deg: fov };
         let keys = vec![
-            Key { frame: 1.0, value: pose(0.0, Some(20.0)) },
-            Key { frame: 5.0, value: pose(8.0, Some(40.0)) },
+            Key { frame: 1, value: pose(0.0, Some(20.0)) },
+            Key { frame: 5, value: pose(8.0, Some(40.0)) },
         ];
         let linear = CameraTrack { keys: keys.clone(), interpolation: Interpolation::Linear };
-        let eye = |t: &CameraTrack, f: f64| t.at(f, DVec3::Y, 40.0).unwrap().eye.x;
-        assert_eq!([-3.0, 1.0, 2.0, 5.0, 9.0].map(|f| eye(&linear, f)), [0.0, 0.0, 2.0, 8.0, 8.0]);
-        assert_eq!(linear.at(3.0, DVec3::Y, 40.0).unwrap().fov_deg, 30.0);
+        let eye = |t: &CameraTrack, f: i64| t.at(f, DVec3::Y, 40.0).unwrap().eye.x;
+        assert_eq!([-3, 1, 2, 5, 9].map(|f| eye(&linear, f)), [0.0, 0.0, 2.0, 8.0, 8.0]);
+        assert_eq!(linear.at(3, DVec3::Y, 40.0).unwrap().fov_deg, 30.0);
         let smooth = CameraTrack { keys, interpolation: Interpolation::Smooth };
         // a quarter of the way: x² (3 − 2x) = 0.15625
-        assert_eq!(eye(&smooth, 2.0), 8.0 * 0.15625);
+        assert_eq!(eye(&smooth, 2), 8.0 * 0.15625);
+        // numbers beyond those that f64 holds, as of files named by their time
+        let long = |track: &CameraTrack| {
+            let later = |k: &Key<CameraPose>| Key { frame: 20_240_101_123_045_120 + k.frame, ..*k };
+            CameraTrack { keys: track.keys.iter().map(later).collect(), ..*track }
+        };
+        assert_eq!(eye(&long(&linear), 20_240_101_123_045_122), 2.0);
     }
 }

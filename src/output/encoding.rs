@@ -195,7 +195,7 @@ pub fn picture_files(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::job::settings;
+    use crate::job::{Options, Settings, settings};
 
     #[test]
     fn the_table_is_in_order_and_has_the_words_of_the_job() {
@@ -204,5 +204,19 @@ mod tests {
         }
         let words: Vec<&str> = FORMATS.iter().flat_map(|line| line.words).copied().collect();
         assert_eq!(words, settings::FORMATS);
+    }
+
+    #[test]
+    fn webp_holds_what_the_job_lets_through() {
+        let encoding = Encoding { format: Format::Webp, bits: Bits::Eight, exposure_stops: 0.0, quality: 92 };
+        let is_held = |size: [u32; 2]| {
+            let options =
+                Options { format: Some("webp".to_string()), size: Some(size), ..Options::default() };
+            let mut film = Film::new(size, false, AovSet::default());
+            film.rgb = vec![[0.5; 3]; (size[0] * size[1]) as usize].into();
+            (encode(&film, encoding).is_ok(), Settings::new(&options).is_ok())
+        };
+        assert_eq!([is_held([16384, 1]), is_held([1, 16384])], [(true, true); 2]);
+        assert_eq!([is_held([16385, 1]), is_held([1, 16385])], [(false, false); 2]);
     }
 }

@@ -149,9 +149,18 @@ fn place_light(light: &mut Light, layer: &DAffine3) {
     }
 }
 
-/// What is told of a file when the first picture uses it.
-pub(super) fn tell(gltf: &Gltf, path: &Path, options: &ReadOptions, warnings: &mut Warnings) {
-    warnings.merge(&gltf.warnings);
+/// What is told of a file when the first picture uses it, but for what is told another way.
+pub(super) fn tell(
+    gltf: &Gltf,
+    path: &Path,
+    options: &ReadOptions,
+    told: Option<&String>,
+    warnings: &mut Warnings,
+) {
+    match told {
+        Some(told) => warnings.merge(&gltf.warnings.without(told)),
+        None => warnings.merge(&gltf.warnings),
+    };
     if options.materials_file.is_some() {
         warnings.add(Some(path), None, "a layer's MTL is not laid over the materials of a glTF");
     }

@@ -14,7 +14,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 /// Another name for each form in which boxes are kept, or in which they are found.
-const STORED: &str = "boxes-1";
+const STORED: &str = "boxes-2";
 /// Below so many bytes files are scanned in less than a millisecond.
 const LEAST_STORED_BYTES: u64 = 1 << 20;
 
@@ -41,11 +41,12 @@ pub(super) fn bounds(
         None => scan(),
     };
     let mut all = Bounds::EMPTY;
-    for ((layer, _, file), bounds) in files.iter().zip(boxes) {
+    for ((layer, ..), bounds) in files.iter().zip(boxes) {
         match bounds {
             Ok(b) => all.merge(&auto::placed(layer, &b)),
             Err(error) => {
-                warnings.add(Some(&file.path), None, format!("left out of the auto camera's box: {error}"));
+                // it names the file, and the line where there is one
+                warnings.add(None, None, format!("{error}; it is left out of the auto camera's box"));
             }
         }
     }

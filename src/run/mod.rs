@@ -18,6 +18,7 @@ mod read;
 mod report;
 mod share;
 mod source;
+mod spoken;
 mod trace;
 mod under_way;
 pub mod verify;
@@ -282,6 +283,10 @@ pub fn render(
         tell(&notes, &mut warnings, &mut report, on_event);
     }
     if !stop.asked() {
+        // a frame that failed may have what the others do not
+        if report.totals.failed == 0 {
+            tell(&reader.unmet_overrides(), &mut warnings, &mut report, on_event);
+        }
         for left in check::left_over(job, &report, |index| reader.blank(index)) {
             report.frame(&left);
             on_event(&Event::Frame(Box::new(left)));

@@ -7,16 +7,17 @@ use super::memory::{expected_bytes, needed_bytes, reckoned_bytes, refusal};
 use super::prepare::{Prepared, prepare};
 use super::share::{Share, Turn};
 use super::source::{Place, Sources};
+use super::spoken::Spoken;
 use super::{Note, RunOptions, panic_text};
 use crate::device::Stop;
 use crate::diff::Change;
-use crate::format::{FormatError, Loaded, ParseKind, ReadOptions};
+use crate::format::{FormatError, ParseKind, ReadOptions};
 use crate::job::{Job, Picture, Settings};
 use crate::output::{Bits, Encoding, Format, Records};
 use crate::scene::{Frame, Object, PartHash, PartHasher, Shot};
 use crate::schedule::estimate::Term;
 use crate::warning::Warnings;
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -60,6 +61,7 @@ pub(super) struct Reader<'a> {
     last_shown: HashMap<&'a Path, usize>,
     /// The first picture of each sequence.
     first_of: HashMap<usize, usize>,
+    spoken: Spoken,
 }
 
 /// Reads pictures for devices until there are no more.
@@ -105,7 +107,13 @@ impl<'a> Reader<'a> {
             last_shown.extend(files(job, picture).map(|(_, path)| (path, index)));
             first_of.entry(picture.sequence).or_insert(index);
         }
-        Self { job, options, records, prepared, estimator, at_once, last_shown, first_of }
+        let spoken = Spoken::default();
+        Self { job, options, records, prepared, estimator, at_once, last_shown, first_of, spoken }
+    }
+
+    /// What is to be told of materials that the job speaks of and no frame that was read has.
+    pub(super) fn unmet_overrides(&self) -> Warnings {
+        self.spoken.unmet()
     }
 
     /// Which objects of a picture stand in files that later pictures show, too.
@@ -140,6 +148,9 @@ impl<'a> Reader<'a> {
                 report.ms.read = Some(loaded.read_ms);
                 report.ms.parse = Some(loaded.parse_ms);
                 let parsing = loaded.parsing();
+                if let Some(unmet) = loaded.unmet_overrides {
+                    self.spoken.see(&picture.settings.read.material_overrides, |name| unmet.contains(name));
+                }
                 (loaded.frame, loaded.views, loaded.sources, parsing)
             }
             Err(error) => {
@@ -238,9 +249,19 @@ struct LoadedFrame {
     bytes_read: u64,
     read_ms: f64,
     parse_ms: f64,
+    /// Names of materials that the job speaks of and none of its files has; None: it has no file.
+    unmet_overrides: Option<HashSet<Vec<u8>>>,
 }
 
 impl LoadedFrame {
+    /// Takes the names that one of its files does not have.
+    fn without_materials(&mut self, unmet: &[Vec<u8>]) {
+        match &mut self.unmet_overrides {
+            Some(all) => all.retain(|name| unmet.contains(name)),
+            None => self.unmet_overrides = Some(unmet.iter().cloned().collect()),
+        }
+    }
+
     /// What kind of work its parsing was.
     fn parsing(&self) -> Term<'static> {
         match self.kind {
@@ -261,6 +282,11 @@ enum LoadError {
 }
 
 impl LoadError {
+    /// What is missing, where that fails the frame; it is told with its error, not as a warning, too.
+    fn missing(sentence: &str) -> Self {
+        Self::Bad(format!("{sentence}; the frame is not rendered (--strict)"))
+    }
+
     fn text(self) -> String {
         match self {
             Self::Bad(text) | Self::TooLarge(text) => text,
@@ -306,6 +332,7 @@ fn load_frame(
         bytes_read: 0,
         read_ms: 0.0,
         parse_ms: 0.0,
+        unmet_overrides: None,
     };
     for (at, source) in picture.sources.iter().enumerate() {
         let Some(file) = source.file else { continue };
@@ -314,13 +341,15 @@ fn load_frame(
         let path = &layer.files[file].path;
         if let Some(moment) = &layer.files[file].moment {
             let shown = sources.animations.show(path, moment, &options, source.transform.as_ref(), true)?;
+            let missing = shown.gltf.missing.first().filter(|_| strict);
             if shown.is_first {
                 all.bytes_read += shown.gltf.bytes_read;
-                animation::tell(&shown.gltf, path, &options, warnings);
+                animation::tell(&shown.gltf, path, &options, missing, warnings);
             }
-            if strict && let Some(missing) = shown.gltf.missing.first() {
-                return Err(LoadError::Bad(format!("{missing}; the frame is not rendered (--strict)")));
+            if let Some(missing) = missing {
+                return Err(LoadError::missing(missing));
             }
+            all.without_materials(&shown.gltf.unmet_overrides);
             all.is_posed = true;
             all.parse_ms += shown.parse_ms;
             all.views.cameras.extend(shown.views.cameras);
@@ -335,17 +364,21 @@ fn load_frame(
             _ => Place::Later,
         };
         let (loaded, is_new) = sources.load(path, &options, place)?;
+        let missing = loaded.missing.first().filter(|_| strict);
         if is_new {
             all.kind = all.kind.max(loaded.kind);
             all.bytes_read += loaded.bytes_read;
             all.read_ms += loaded.read_ms;
             all.parse_ms += loaded.parse_ms;
-            warnings.merge(&loaded.warnings);
-            warn_of_materials(path, &loaded, warnings);
+            match missing {
+                Some(told) => warnings.merge(&loaded.warnings.without(told)),
+                None => warnings.merge(&loaded.warnings),
+            };
         }
-        if strict && let Some(missing) = loaded.missing.first() {
-            return Err(LoadError::Bad(format!("{missing}; the frame is not rendered (--strict)")));
+        if let Some(missing) = missing {
+            return Err(LoadError::missing(missing));
         }
+        all.without_materials(&loaded.unmet_overrides);
         all.sources.push(at);
         all.frame
             .objects
@@ -375,20 +408,6 @@ pub fn read_shot(job: &Job, options: &RunOptions) -> Result<(Frame, Shot), Strin
     let loaded = load_frame(job, picture, true, sources, options.lenient, options.strict, warnings);
     let LoadedFrame { frame, views, .. } = loaded.map_err(LoadError::text)?;
     Ok((frame, prepared.shot(picture, &views)?))
-}
-
-/// Names frames that nothing can be seen of.
-fn warn_of_materials(path: &Path, loaded: &Loaded, warnings: &mut Warnings) {
-    let g = &loaded.geometry;
-    let has_faces = !g.triangles.0.is_empty();
-    let is_seen = |run: &[u32; 2]| g.materials.get(run[1] as usize).is_none_or(|m| m.d > 0.0);
-    if has_faces && !g.material_runs.0.iter().any(is_seen) {
-        warnings.add(
-            Some(path),
-            None,
-            "every face is wholly transparent (d 0); some exporters write that by mistake",
-        );
-    }
 }
 
 /// How a layer of a picture is read.

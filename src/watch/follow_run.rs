@@ -47,7 +47,7 @@ pub(super) fn fix_cameras(job: &mut Job) -> Result<(), FormatError> {
             if settings.camera == CameraChoice::Auto {
                 let camera = auto::camera_around(&bounds, settings, ENLARGED);
                 let value = CameraPose { eye: camera.eye, look_at: camera.look_at, up: None, fov_deg: None };
-                let keys = vec![Key { frame: 0.0, value }];
+                let keys = vec![Key { frame: 0, value }];
                 let track = CameraTrack { keys, interpolation: Interpolation::Linear };
                 Arc::make_mut(settings).camera = CameraChoice::Given(track);
             }

@@ -31,7 +31,7 @@ use gltf::json::extensions::texture::TextureTransform;
 use gltf::json::material::{AlphaMode, NormalTexture};
 use gltf::json::texture::{Info, WrappingMode};
 use gltf::json::validation::Checked;
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 
 /// Reflectance of what is no metal, along the normal.
 const DIELECTRIC: f32 = 0.04;
@@ -46,11 +46,18 @@ pub(super) struct Materials {
     made: HashMap<usize, Part<Material>>,
     /// What the job says of materials, by their names.
     overlays: HashMap<Vec<u8>, Given>,
+    /// Those of the names that a material has.
+    met: HashSet<Vec<u8>>,
 }
 
 impl Materials {
     pub(super) fn new(pictures: Pictures, overlays: HashMap<Vec<u8>, Given>) -> Self {
-        Self { pictures, made: HashMap::new(), overlays }
+        Self { pictures, made: HashMap::new(), overlays, met: HashSet::new() }
+    }
+
+    /// The names that the job speaks of and no material has.
+    pub(super) fn unmet_overrides(&self) -> Vec<Vec<u8>> {
+        self.overlays.keys().filter(|name| !self.met.contains(*name)).cloned().collect()
     }
 
     /// The material in that place of the file.
@@ -77,6 +84,7 @@ impl Materials {
                 maps.warn("maps that the job gives to a glTF's material are not laid over its own");
             }
             made = laid_over(made, overlay);
+            self.met.insert(name.as_bytes().to_vec());
         }
         let made = Part::new(made);
         self.made.insert(index, made.clone());

@@ -122,6 +122,8 @@ pub struct Gltf {
     pub warnings: Warnings,
     /// Images that were named and cannot be had, each as a sentence.
     pub missing: Vec<String>,
+    /// Names of materials that the options' overrides speak of and no mesh has.
+    pub unmet_overrides: Vec<Vec<u8>>,
     /// Every file whose content it is made of.
     pub inputs: Vec<PathBuf>,
     /// Bytes that were read.
@@ -179,8 +181,10 @@ impl Gltf {
             warnings.add(Some(&file.path), None, format!("the extension {name} is not mapped"));
         }
         light::check(&file, &mut warnings);
+        let unmet_overrides = materials.unmet_overrides();
         let Materials { pictures, .. } = materials;
         Ok(Self {
+            unmet_overrides,
             inputs: file.inputs.iter().cloned().chain(pictures.inputs).collect(),
             bytes_read: file.bytes_read + pictures.bytes_read,
             missing: pictures.missing,

@@ -6,8 +6,8 @@ mod words;
 use super::text::{Tally, Text, first_word, is_line_end, without_comment};
 pub(super) use map::{MapStatement, Side};
 use std::collections::{BTreeSet, HashMap};
-pub use words::is_mtl_word;
 pub(super) use words::{Given, MapSlot, Refusal};
+pub use words::{mtl_word_accepts, mtl_word_takes, mtl_words};
 
 /// What an MTL says.
 #[derive(Debug, Default)]

@@ -175,10 +175,16 @@ impl Given {
                 if !matches!(slot, MapSlot::Bump | MapSlot::Norm) && map.bump_multiplier.take().is_some() {
                     map.has_idle("-bm");
                 }
+                if map.channel.is_some() && !matches!(slot, MapSlot::Ns | MapSlot::D | MapSlot::Bump) {
+                    map.has_idle("-imfchan");
+                }
                 return Ok(self.set_map(slot, map));
             }
             Takes::Reflection => {
-                let map = MapStatement::parse(value).ok_or(Refusal::Malformed)?;
+                let mut map = MapStatement::parse(value).ok_or(Refusal::Malformed)?;
+                if map.channel.is_some() {
+                    map.has_idle("-imfchan");
+                }
                 return Ok(self.set_map(MapSlot::Refl(map.side.unwrap_or(Side::Sphere)), map));
             }
             Takes::Idle => return Ok(vec![known]),
@@ -214,9 +220,48 @@ impl Given {
     }
 }
 
-/// Whether a word is one that an MTL may have, in any case.
-pub fn is_mtl_word(word: &str) -> bool {
-    WORDS.iter().any(|(known, _)| word.eq_ignore_ascii_case(known))
+/// The words of an MTL that bear on a picture.
+pub fn mtl_words() -> impl Iterator<Item = &'static str> {
+    let has_effect = |(_, takes): &&(&str, Takes)| !matches!(takes, Takes::Idle | Takes::Ignored);
+    WORDS.iter().filter(has_effect).map(|(word, _)| *word)
+}
+
+/// What a word of an MTL takes, for people to read; None where there is no such word. Words are known in any case.
+pub fn mtl_word_takes(word: &str) -> Option<String> {
+    let (_, takes) = WORDS.iter().find(|(known, _)| word.eq_ignore_ascii_case(known))?;
+    Some(match takes {
+        Takes::Color(_) => "three numbers, or one for all three".to_string(),
+        Takes::Number(_, least, greatest) => match (*least, *greatest) {
+            (f32::MIN, f32::MAX) => "a number".to_string(),
+            (least, f32::MAX) => format!("a number of {least} or more"),
+            (least, greatest) => format!("a number from {least} to {greatest}"),
+        },
+        Takes::Dissolve => "a number from 0 to 1, or `-halo` and such a number".to_string(),
+        Takes::Model => "a whole number from 0 to 10".to_string(),
+        Takes::Map(_) | Takes::Reflection => "a file, with options before or behind its name".to_string(),
+        Takes::Idle | Takes::Ignored => "anything".to_string(),
+    })
+}
+
+/// Whether a word takes a value just as it stands: in an MTL what is too much is left out and what is out of range is
+/// moved into it, which a job does not ask for.
+pub fn mtl_word_accepts(word: &str, value: &str) -> bool {
+    let Some((_, takes)) = WORDS.iter().find(|(known, _)| word.eq_ignore_ascii_case(known)) else {
+        return false;
+    };
+    let value = value.as_bytes();
+    let only = |value: &[u8]| number(value).filter(|_| words(value).count() == 1);
+    match takes {
+        Takes::Color(_) => color(value).is_some() && words(value).count() <= 3,
+        Takes::Number(_, least, greatest) => only(value).is_some_and(|x| (*least..=*greatest).contains(&x)),
+        Takes::Dissolve => {
+            let number = value.strip_prefix(b"-halo").unwrap_or(value);
+            only(number).is_some_and(|x| (0.0..=1.0).contains(&x))
+        }
+        Takes::Model => only(value).and_then(|_| model(value)).is_some(),
+        Takes::Map(_) | Takes::Reflection => MapStatement::parse(value).is_some(),
+        Takes::Idle | Takes::Ignored => true,
+    }
 }
 
 /// The first word as a finite number.
@@ -294,6 +339,51 @@ mod tests {
         assert_eq!(idle("map_kd", "-blendu on -type sphere -bm 2 a.png"), ["-blendu", "-type", "-bm"]);
         assert!(idle("map_bump", "-bm 2 a.png").is_empty() && idle("sharpness", "60").is_empty());
         assert!(idle("refl", "-type sphere a.png").is_empty());
+        // a channel is of maps that are one number
+        for word in ["map_Ka", "map_Kd", "map_Ks", "map_Ke", "norm", "refl"] {
+            assert_eq!(idle(word, "-imfchan r a.png"), ["-imfchan"], "{word}");
+        }
+        for word in ["map_d", "map_Ns", "bump"] {
+            assert!(idle(word, "-imfchan r a.png").is_empty(), "{word}");
+        }
+    }
+
+    #[test]
+    fn what_a_job_may_say() {
+        for (word, value) in [
+            ("Kd", "0.1 0.2 0.3"),
+            ("kd", "0.5"),
+            ("d", "0.5"),
+            ("d", "-halo 0.5"),
+            ("Ni", "-2"),
+            ("Ns", "1e4"),
+            ("illum", "10"),
+            ("map_Kd", "-s 2 a b.png"),
+            ("refl", "-type sphere a.png"),
+            ("Pr", "x"),
+        ] {
+            assert!(mtl_word_accepts(word, value), "{word} {value}");
+        }
+        for (word, value) in [
+            ("Kd", "0.1 0.2"),
+            ("Kd", "0.1 0.2 0.3 0.4"),
+            ("Kd", "red"),
+            ("d", "2"),
+            ("d", "-halo 1.5"),
+            ("d", "0.5 0.5"),
+            ("Tr", "-0.1"),
+            ("Ni", "1 2 3"),
+            ("Ns", "-1"),
+            ("illum", "11"),
+            ("illum", "1 2"),
+            ("map_Kd", "-s 1 1 1"),
+            ("Nii", "1.5"),
+        ] {
+            assert!(!mtl_word_accepts(word, value), "{word} {value}");
+        }
+        let takes = |word| mtl_word_takes(word).unwrap();
+        assert_eq!([takes("Ns"), takes("tr")], ["a number of 0 or more", "a number from 0 to 1"]);
+        assert!(mtl_words().any(|w| w == "Ni") && !mtl_words().any(|w| w == "Pr"));
     }
 
     fn slots(given: &Given) -> Vec<(MapSlot, &str)> {

@@ -64,7 +64,7 @@ pub(super) fn scan_again<'a>(text: &'a [u8], before: &Parsed) -> Option<Scan<'a>
         && scan.oddities.malformed.count == 0
         && scan.oddities.short_faces.count == 0;
     let refused = settle_attribute(&mut scan.faces.normals, corners, &scan.normals, usable_normal);
-    (sound && refused == 0).then_some(scan)
+    (sound && refused.is_none()).then_some(scan)
 }
 
 /// A place in the frame before, among the runs of one kind.

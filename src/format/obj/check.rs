@@ -2,7 +2,7 @@
 
 use super::scan::{FaceList, Scan, face_offset, face_words, position_offset};
 use crate::format::error::FormatError;
-use crate::format::text::{Text, shown};
+use crate::format::text::{Tally, Text, shown_statement};
 use crate::scene::ABSENT;
 use crate::warning::Warnings;
 use std::path::Path;
@@ -68,9 +68,12 @@ fn without_position(word: &[u8], vertices: usize) -> String {
     let whole = word.split(|&b| b == b'/').count() <= 3
         && !digits.is_empty()
         && word.iter().all(|b| b.is_ascii_digit() || matches!(b, b'/' | b'-' | b'+'));
-    let index = shown(index);
+    let index = shown_statement(index);
     if !whole {
-        format!("`{}` is no corner (position, position/texcoord, position//normal or all three)", shown(word))
+        format!(
+            "`{}` is no corner (position, position/texcoord, position//normal or all three)",
+            shown_statement(word)
+        )
     } else if digits.iter().all(|&b| b == b'0') {
         format!("position index {index} is not one: they count from 1, or back from -1")
     } else if index.starts_with('-') {
@@ -104,26 +107,43 @@ fn drop_faces(scan: &mut Scan, bad: &[u32]) {
     scan.smoothing.iter_mut().for_each(|(face, _)| *face = moved(*face));
 }
 
-/// Makes [`ABSENT`] what names no usable value, and fills the list up to all corners; how many were given that name
-/// none. The list becomes empty where no corner has an index.
+/// What of an attribute's indices was refused.
+#[derive(Debug, Default)]
+pub(super) struct Refused {
+    /// Corners whose index names no value, and the first of them.
+    pub beyond: Tally,
+    /// Corners whose index names a value that cannot be used, and the first such value.
+    pub unusable: Tally,
+}
+
+impl Refused {
+    pub(super) fn is_none(&self) -> bool {
+        self.beyond.count == 0 && self.unusable.count == 0
+    }
+}
+
+/// Makes [`ABSENT`] what names no usable value, and fills the list up to all corners; what was given that names none. The
+/// list becomes empty where no corner has an index.
 pub(super) fn settle_attribute<const N: usize>(
     indices: &mut Vec<u32>,
     corners: usize,
     values: &[[f32; N]],
     usable: impl Fn(&[f32; N]) -> bool,
-) -> u64 {
+) -> Refused {
     // ABSENT becomes 0, so that one look finds the highest index
     let end = indices.iter().map(|index| index.wrapping_add(1)).max().unwrap_or(0);
-    let mut refused = 0;
+    let mut refused = Refused::default();
     if end as usize > values.len() || !values.iter().all(&usable) {
-        for index in indices.iter_mut().filter(|index| **index != ABSENT) {
-            if !values.get(*index as usize).is_some_and(&usable) {
-                *index = ABSENT;
-                refused += 1;
+        for (corner, index) in indices.iter_mut().enumerate().filter(|(_, index)| **index != ABSENT) {
+            match values.get(*index as usize) {
+                Some(value) if usable(value) => continue,
+                Some(_) => refused.unusable.add(*index as usize),
+                None => refused.beyond.add(corner),
             }
+            *index = ABSENT;
         }
     }
-    if end == 0 || (refused > 0 && indices.iter().all(|&index| index == ABSENT)) {
+    if end == 0 || (!refused.is_none() && indices.iter().all(|&index| index == ABSENT)) {
         indices.clear();
     } else {
         indices.resize(corners, ABSENT);

@@ -19,10 +19,13 @@ mod triangulate;
 use super::ReadOptions;
 use super::error::FormatError;
 use super::library::Library;
-use super::text::{Tally, Text, first_word, is_line_end, line_end, shown, trimmed, without_comment};
+use super::text::{
+    Tally, Text, first_word, is_blank, is_line_end, line_end, shown, shown_statement, trimmed,
+    without_comment,
+};
 use crate::math::{Bounds, DVec3};
 use crate::scene::Geometry;
-use crate::warning::Warnings;
+use crate::warning::{Warning, Warnings};
 use mesh::{Known, UsedMaterials};
 use scan::Scan;
 use std::path::Path;
@@ -54,6 +57,8 @@ pub(super) struct Lines<'a> {
 pub(super) struct Shape {
     pub parsed: ParsedObj,
     known: Option<Known>,
+    /// A material that no library has, as a sentence.
+    pub missing: Option<String>,
 }
 
 impl Shape {
@@ -99,15 +104,29 @@ pub(super) fn add_to_bounds(bounds: &mut Bounds, text: &Text) {
 
 /// What stands behind each `mtllib`, found without reading the rest.
 pub(super) fn library_statements<'t>(text: &'t Text<'_>) -> Vec<&'t [u8]> {
+    statements(text, b"mtllib").map(|(_, behind)| behind).collect()
+}
+
+/// The line of the first statement of that word with that behind it, found without reading the rest.
+pub(super) fn line_of(text: &Text, word: &[u8], behind: &[u8]) -> Option<u32> {
+    statements(text, word).find(|&(_, found)| found == behind).map(|(start, _)| text.line_at(start))
+}
+
+/// Tells the line of a statement by its word and what stands behind it; asked where that is to be told of.
+pub(super) type LineOf<'a> = &'a dyn Fn(&[u8], &[u8]) -> Option<u32>;
+
+/// Where each statement of a word begins, and what stands behind the word.
+fn statements<'t>(text: &'t Text<'_>, word: &'t [u8]) -> impl Iterator<Item = (usize, &'t [u8])> {
     let bytes: &[u8] = &text.joined;
-    memchr::memmem::find_iter(bytes, b"mtllib")
-        .filter_map(|at| {
-            let starts = bytes[..at].iter().rposition(|&b| is_line_end(b)).map_or(0, |i| i + 1);
-            let line = trimmed(without_comment(&bytes[starts..line_end(bytes, at)]));
-            let (word, rest) = first_word(line);
-            (word == b"mtllib").then(|| trimmed(rest))
-        })
-        .collect()
+    memchr::memmem::find_iter(bytes, word).filter_map(move |start| {
+        let before = bytes[..start].iter().rev().find(|&&b| !is_blank(b));
+        if before.is_some_and(|&b| !is_line_end(b)) {
+            return None;
+        }
+        let line = &bytes[start..line_end(bytes, start)];
+        let (found, behind) = first_word(without_comment(line));
+        (found == word).then_some((start, behind))
+    })
 }
 
 impl<'a> Lines<'a> {
@@ -119,12 +138,17 @@ impl<'a> Lines<'a> {
         before: Option<&'a Parsed>,
         warnings: &mut Warnings,
     ) -> Result<Self, FormatError> {
+        if let Some(zero) = text.first_zero {
+            return Err(FormatError::Binary { path: path.to_path_buf(), line: text.line_at(zero) });
+        }
         let scan_again = |parsed| again::scan_again(&text.joined, parsed).map(|scan| (scan, parsed));
         let again = before.filter(|_| text.is_plain()).and_then(scan_again);
         let mut lines = if let Some((scan, before)) = again {
             Self { scan, text, path, before: Some(before), all_usable: true }
         } else {
             let mut scan = scan::scan(&text.joined);
+            // what has the faces of the frame before is an OBJ
+            refuse_something_else(&scan, text, path)?;
             check::check_faces(&mut scan, text, path, lenient, warnings)?;
             Self { scan, text, path, before: None, all_usable: false }
         };
@@ -152,7 +176,8 @@ impl<'a> Lines<'a> {
     ) -> Shape {
         let can_be_known = self.all_usable && self.can_be_known();
         let used = mesh::materials(&self.scan, library);
-        warn_of_unknown(&used, library, self.path, warnings);
+        let line_of = |word: &[u8], behind: &[u8]| line_of(self.text, word, behind);
+        let missing = tell_of_unknown(&used, library, self.path, &line_of, warnings);
         let angle = options.smooth_angle_deg;
         let (geometry, known) = match self.before {
             None => mesh::geometry(self.scan, used.runs, used.materials, angle),
@@ -162,7 +187,7 @@ impl<'a> Lines<'a> {
         };
         warn_if_invisible(&geometry, self.path, warnings);
         let parsed = ParsedObj { geometry, material_names: used.names };
-        Shape { parsed, known: can_be_known.then_some(known) }
+        Shape { parsed, known: can_be_known.then_some(known), missing }
     }
 
     /// Whether this can serve as the frame before another: nothing is odd about its faces and vertices.
@@ -186,7 +211,8 @@ impl<'a> Lines<'a> {
         self.warn(warnings, odd.malformed, "a vertex has a malformed or missing number; faces cannot use it");
         self.warn(warnings, odd.short_faces, "a face has fewer than 3 corners and is dropped");
         self.warn(warnings, odd.unrendered, "points, lines, curves and surfaces are not rendered");
-        let unknown = format!("unknown statements are skipped, the first is `{}`", shown(odd.unknown_word));
+        let unknown =
+            format!("unknown statements are skipped, the first is `{}`", shown_statement(odd.unknown_word));
         self.warn(warnings, odd.unknown, unknown);
         let many = triangulate::MAX_EAR_CORNERS;
         let counts = self.before.map_or(&self.scan.faces.counts, |before| &before.geometry.faces.counts);
@@ -206,30 +232,80 @@ impl<'a> Lines<'a> {
         let Scan { faces, texcoords, normals, .. } = &mut self.scan;
         let corners = faces.positions.len();
         let finite = |t: &[f32; 2]| t.iter().all(|x| x.is_finite());
-        let refused = [
-            ("texcoord", check::settle_attribute(&mut faces.texcoords, corners, texcoords, finite)),
-            ("normal", check::settle_attribute(&mut faces.normals, corners, normals, usable_normal)),
-        ];
-        for (kind, count) in refused.into_iter().filter(|&(_, count)| count > 0) {
-            let text = format!("a {kind} index names none that can be used; it counts as absent");
-            warnings.add_times(Some(self.path), None, text, count);
+        let of_texcoords = check::settle_attribute(&mut faces.texcoords, corners, texcoords, finite);
+        let of_normals = check::settle_attribute(&mut faces.normals, corners, normals, usable_normal);
+        let is_zero = normals.get(of_normals.unusable.first).is_some_and(|n| *n == [0.0; 3]);
+        let counts = [texcoords.len(), normals.len()];
+        for (kind, count, refused) in
+            [("texcoord", counts[0], &of_texcoords), ("normal", counts[1], &of_normals)]
+        {
+            let Tally { count: times, first } = refused.beyond;
+            if times > 0 {
+                let plural = if count == 1 { "" } else { "s" };
+                let text = format!(
+                    "a {kind} index is 0 or beyond the file's {count} {kind}{plural}; it counts as absent"
+                );
+                warnings.add_times(Some(self.path), self.line_of_corner(first), text, times);
+            }
         }
-        refused.iter().all(|&(_, count)| count == 0)
+        let normal = if is_zero { "a normal has length 0" } else { "a normal is not three finite numbers" };
+        for (word, cause, unusable) in [
+            (&b"vt"[..], "a texcoord is not finite", of_texcoords.unusable),
+            (b"vn", normal, of_normals.unusable),
+        ] {
+            if unusable.count > 0 {
+                let line = statements(self.text, word).nth(unusable.first);
+                let line = line.map(|(start, _)| self.text.line_at(start));
+                let text = format!("{cause}; where a corner names it, it counts as absent");
+                warnings.add_times(Some(self.path), line, text, unusable.count);
+            }
+        }
+        of_texcoords.is_none() && of_normals.is_none()
+    }
+
+    /// The line of the face that has a corner; None where faces were dropped, so that they no longer match the lines.
+    fn line_of_corner(&self, corner: usize) -> Option<u32> {
+        let mut end = 0;
+        let face = self.scan.faces.counts.iter().position(|&count| {
+            end += count as usize;
+            corner < end
+        });
+        let face = face.filter(|_| !self.scan.runs.is_empty())?;
+        scan::face_offset(&self.text.joined, face as u32).map(|offset| self.text.line_at(offset))
     }
 }
 
-fn warn_of_unknown(used: &UsedMaterials, library: &Library, path: &Path, warnings: &mut Warnings) {
-    if let Some(name) = used.unknown.first()
-        && !library.incomplete
-    {
-        let text = format!("material `{}` is in no library; its faces get the default", shown(name));
-        warnings.add_times(Some(path), None, text, used.unknown.len() as u64);
+fn refuse_something_else(scan: &Scan, text: &Text, path: &Path) -> Result<(), FormatError> {
+    if !scan.is_something_else() {
+        return Ok(());
     }
+    let start = scan.oddities.unknown.first;
+    let line = &text.joined[start..line_end(&text.joined, start)];
+    Err(FormatError::NoObj {
+        path: path.to_path_buf(),
+        line: text.line_at(start),
+        statement: shown_statement(trimmed(line)),
+    })
+}
+
+/// Warns of materials that no library has; the sentence for the first. Where a library is missing, that was told.
+fn tell_of_unknown(
+    used: &UsedMaterials,
+    library: &Library,
+    path: &Path,
+    line_of: LineOf<'_>,
+    warnings: &mut Warnings,
+) -> Option<String> {
+    let name = used.unknown.first().filter(|_| !library.incomplete)?;
+    let text = format!("material `{}` is in no library; its faces get the default", shown(name));
+    let line = line_of(b"usemtl", name);
+    warnings.add_times(Some(path), line, text.clone(), used.unknown.len() as u64);
+    Some(Warning { file: Some(path.to_path_buf()), line, text, count: 1 }.to_string())
 }
 
 fn warn_if_invisible(geometry: &Geometry, path: &Path, warnings: &mut Warnings) {
     if is_invisible(geometry) {
-        let text = "every face is wholly transparent (d 0); nothing will be seen of them";
+        let text = "every face is wholly transparent (d 0), as some exporters write by mistake; nothing will be seen of them";
         warnings.add(Some(path), None, text);
     }
 }

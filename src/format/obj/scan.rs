@@ -35,6 +35,8 @@ pub(super) struct Scan<'a> {
     pub smoothing: Vec<(u32, u32)>,
     /// What stands behind `mtllib`.
     pub libraries: Vec<&'a [u8]>,
+    /// Whether another statement of the format than those for vertices and faces was met.
+    pub has_other_words: bool,
     /// What was met and left out.
     pub oddities: Oddities<'a>,
 }
@@ -162,6 +164,13 @@ impl<'a> Scan<'a> {
     pub(super) fn material_runs(&self) -> impl Iterator<Item = (u32, &'a [u8])> {
         let ends = self.materials.iter().skip(1).map(|&(face, _)| face).chain([self.face_count]);
         self.materials.iter().copied().zip(ends).filter(|((face, _), end)| face < end).map(|(run, _)| run)
+    }
+
+    /// Whether there are statements and none of them is one of the format.
+    pub(super) fn is_something_else(&self) -> bool {
+        let vertices = self.positions.len() + self.texcoords.len() + self.normals.len();
+        let faces = u64::from(self.face_count) + self.oddities.short_faces.count;
+        self.oddities.unknown.count > 0 && !self.has_other_words && vertices == 0 && faces == 0
     }
 
     /// Reads the statement at `start`; the place where the next line begins.
@@ -312,7 +321,7 @@ impl<'a> Scan<'a> {
         let (keyword, rest) = first_word(line);
         let face = self.face_count;
         match keyword {
-            b"" => {}
+            b"" => return end + 1,
             b"o" => self.objects.push(face),
             b"usemtl" => self.materials.push((face, rest)),
             b"mtllib" => self.libraries.push(rest),
@@ -324,8 +333,10 @@ impl<'a> Scan<'a> {
                     self.oddities.unknown_word = keyword;
                 }
                 self.oddities.unknown.add(start);
+                return end + 1;
             }
         }
+        self.has_other_words = true;
         end + 1
     }
 }

@@ -4,7 +4,7 @@
 
 use super::mesh::{self, Known};
 use super::scan::{Kind, Run, Scan};
-use super::{Lines, ParsedObj, Shape, warn_if_invisible, warn_of_unknown};
+use super::{LineOf, Lines, ParsedObj, Shape, tell_of_unknown, warn_if_invisible};
 use crate::format::ReadOptions;
 use crate::format::library::Library;
 use crate::scene::{
@@ -18,7 +18,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 /// Another name for each form in which OBJs are kept, or in which they are read.
-const KIND: &str = "obj-1";
+const KIND: &str = "obj-2";
 
 /// How many lists an entry has.
 const LISTS: usize = 18;
@@ -313,10 +313,11 @@ impl StoredObj {
         self,
         library: &Library,
         path: &Path,
+        line_of: LineOf<'_>,
         warnings: &mut Warnings,
     ) -> Shape {
         let used = mesh::materials(&scan_of(&self.materials, &self.faces), library);
-        warn_of_unknown(&used, library, path, warnings);
+        let missing = tell_of_unknown(&used, library, path, line_of, warnings);
         let counts = &self.faces.counts;
         let borders = self.first_faces.get(1..).unwrap_or_default();
         let geometry = Geometry {
@@ -336,7 +337,7 @@ impl StoredObj {
             texcoords: Arc::new(self.raw_texcoords),
             normals: Arc::new(self.raw_normals),
         });
-        Shape { parsed: ParsedObj { geometry, material_names: used.names }, known }
+        Shape { parsed: ParsedObj { geometry, material_names: used.names }, known, missing }
     }
 }
 

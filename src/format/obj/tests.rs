@@ -145,15 +145,44 @@ fn indices_of_attributes_that_are_not_there_count_as_absent() {
         assert!(g.texcoords.is_none() && g.normals.is_none(), "{corner}");
         assert_eq!(
             warning,
-            format!("a.obj: a {kind} index names none that can be used; it counts as absent")
+            format!("a.obj:7: a {kind} index is 0 or beyond the file's 1 {kind}; it counts as absent")
         );
     }
-    for normal in ["vn 0 0 0", "vn nan 0 1", "vn 1e39 0 0"] {
-        let (g, _) = odd(format!("{SQUARE}vn 0 0 1\n{normal}\nf 1//1 2//2 3//2\n"));
+    for (normal, cause) in [
+        ("vn 0 0 0", "a normal has length 0"),
+        ("vn nan 0 1", "a normal is not three finite numbers"),
+        ("vn 1e39 0 0", "a normal is not three finite numbers"),
+    ] {
+        let (g, warning) = odd(format!("{SQUARE}vn 0 0 1\n{normal}\nf 1//1 2//2 3//2\n"));
         assert_eq!(g.normals.unwrap().corners.0, [[0, ABSENT, ABSENT]], "{normal}");
+        assert_eq!(
+            warning,
+            format!("a.obj:6: {cause}; where a corner names it, it counts as absent (2 times)")
+        );
     }
+    // faces that were dropped are not counted among the lines
+    let (_, warnings) = parse(format!("{SQUARE}f 1 2 9\nf 1/1 2 3\n"), true);
+    assert!(warnings.iter().any(|w| w.starts_with("a.obj: a texcoord index")), "{warnings:?}");
     let (g, _) = odd(format!("{SQUARE}vt nan 0\nf 1/1 2/1 3/1\n"));
     assert!(g.texcoords.is_none());
+}
+
+#[test]
+fn what_is_something_else_is_refused() {
+    let refused = |bytes: &[u8]| parse(bytes, true).0.err();
+    assert_eq!(
+        refused(b"# a\n\nsolid cube # of steel\nfacet normal 0 0 1\n").unwrap(),
+        "a.obj:3: is no OBJ: none of its lines is a statement of one, the first is `solid cube # of steel`; export it again, or name an OBJ file"
+    );
+    assert!(refused(b"\x1f\x8b\x08\0\0abc").unwrap().starts_with("a.obj:1: is binary, not text"));
+    assert!(refused(b"v 0 0 0\n# \0\n").unwrap().starts_with("a.obj:2: is binary"));
+    // one statement of the format, whatever it does, and the others are left out
+    for known in ["v 1 2 3", "v", "vt x", "f 1", "g a", "s off", "mtllib a", "usemtl b", "o", "p 1", "end"] {
+        assert_eq!(refused(format!("ny 1\n{known}\n").as_bytes()), None, "{known}");
+    }
+    for nothing in ["", "\n \t\n", "# v\n#\n"] {
+        assert_eq!(refused(nothing.as_bytes()), None, "{nothing:?}");
+    }
 }
 
 #[test]
@@ -177,7 +206,11 @@ fn what_is_left_out_is_counted() {
     );
     assert_eq!(
         warning("usemtl green\nf 1 2 3\n"),
-        "a.obj: material `green` is in no library; its faces get the default"
+        "a.obj:5: material `green` is in no library; its faces get the default"
+    );
+    assert_eq!(
+        warning("# usemtl green\ng usemtl green\nusemtl red\n usemtl\tgreen # so\nf 1 2 3\n"),
+        "a.obj:8: material `green` is in no library; its faces get the default"
     );
     let empty = odd("");
     assert_eq!(empty.1, "a.obj: the file is empty; its frame shows the background");

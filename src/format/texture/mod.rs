@@ -145,7 +145,7 @@ impl Held {
 }
 
 fn key(path: &Path, texture_use: TextureUse) -> Result<Key, FormatError> {
-    let unreadable = |source| FormatError::Unreadable { path: path.to_path_buf(), source };
+    let unreadable = |cause| FormatError::Unreadable { path: path.to_path_buf(), cause };
     let real = path.canonicalize().map_err(unreadable)?;
     let metadata = fs::metadata(&real).map_err(unreadable)?;
     Ok(Key { path: real, size: metadata.len(), changed: metadata.modified().ok(), texture_use })

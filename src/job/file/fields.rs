@@ -48,7 +48,7 @@ impl<'a> Fields<'a> {
 }
 
 /// Names the key that an error is about, with those around it: `camera.eye`.
-fn about(key: &str, wrong: Wrong) -> Wrong {
+pub(super) fn about(key: &str, wrong: Wrong) -> Wrong {
     let key = wrong.key.map_or_else(|| key.to_string(), |inner| format!("{key}.{inner}"));
     Wrong { key: Some(key), ..wrong }
 }
@@ -56,7 +56,9 @@ fn about(key: &str, wrong: Wrong) -> Wrong {
 /// What is told of a value of another kind than what is wanted.
 pub(super) fn unexpected(node: &Node, wanted: &str) -> Wrong {
     let remedy = match node.value {
-        Value::Number(_) | Value::Bool(_) if wanted.starts_with("text") => "; put it into quotes",
+        Value::Number(_) | Value::Long(_) | Value::Bool(_) if wanted.starts_with("text") => {
+            "; put it into quotes"
+        }
         _ => "",
     };
     Wrong::at(node, format!("expected {wanted}, found {}{remedy}", node.value))
@@ -85,17 +87,28 @@ pub(super) fn list<T>(read: impl Fn(&Node) -> Read<T>) -> impl Fn(&Node) -> Read
 
 /// A number within a range.
 pub(super) fn number(range: RangeInclusive<f64>) -> impl Fn(&Node) -> Read<f64> {
-    move |node| match node.value {
-        Value::Number(x) => within(x, &range).map_err(|e| Wrong::at(node, e)),
-        _ => Err(unexpected(node, &format!("a number {}", limits::told(&range)))),
+    move |node| match node.value.number() {
+        Some(x) => within(x, &range).map_err(|e| Wrong::at(node, e)),
+        None => Err(unexpected(node, &format!("a number {}", limits::told(&range)))),
     }
 }
 
 /// A whole number within a range.
 pub(super) fn whole(range: RangeInclusive<f64>) -> impl Fn(&Node) -> Read<f64> {
-    move |node| match node.value {
-        Value::Number(x) if x.fract() == 0.0 => within(x, &range).map_err(|e| Wrong::at(node, e)),
+    move |node| match node.value.number() {
+        Some(x) if x.fract() == 0.0 => within(x, &range).map_err(|e| Wrong::at(node, e)),
         _ => Err(unexpected(node, &format!("a whole number {}", limits::told(&range)))),
+    }
+}
+
+/// A whole number of 64 bits, as numbers of frames are: none is rounded.
+pub(super) fn integer(node: &Node) -> Read<i64> {
+    // the first f64 beyond them
+    const END: f64 = 9_223_372_036_854_775_808.0;
+    match node.value {
+        Value::Long(x) => Ok(x),
+        Value::Number(x) if x.fract() == 0.0 && (-END..END).contains(&x) => Ok(x as i64),
+        _ => Err(unexpected(node, &format!("a whole number from {} to {}", i64::MIN, i64::MAX))),
     }
 }
 
@@ -123,9 +136,10 @@ pub(super) fn parsed<T>(parse: impl Fn(&str) -> Result<T, String>) -> impl Fn(&N
 /// Frame numbers: `1-48`, or a single one.
 pub(super) fn frames(node: &Node) -> Read<FrameSet> {
     match node.value {
-        Value::Number(x) if x.fract() == 0.0 => x.to_string().parse().map_err(|e: String| Wrong::at(node, e)),
         Value::Text(_) => parsed(str::parse)(node),
-        _ => Err(unexpected(node, "frame numbers, as 1-48, 1-48x2 or 5,7,9-12")),
+        _ => integer(node)
+            .map(|n| FrameSet::from_numbers(&[n]))
+            .map_err(|_| unexpected(node, "frame numbers, as 1-48, 1-48x2 or 5,7,9-12")),
     }
 }
 
@@ -151,7 +165,7 @@ pub(super) fn direction(node: &Node) -> Read<DVec3> {
 /// Three numbers, or one that stands for all three.
 pub(super) fn triple(node: &Node) -> Read<DVec3> {
     match node.value {
-        Value::Number(_) => number(limits::NUMBER)(node).map(DVec3::splat),
+        Value::Number(_) | Value::Long(_) => number(limits::NUMBER)(node).map(DVec3::splat),
         _ => vector(node),
     }
 }

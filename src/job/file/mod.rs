@@ -9,28 +9,47 @@ use super::numbers::FrameSet;
 use super::options::{Background, Options, limits};
 use super::pattern::Pattern;
 use super::settings::{self, FILTERS, MTL_COLORS};
+use super::template;
 use super::track::Placed;
 use super::words::one_of;
 use crate::format::ClipChoice;
 use crate::scene::AovSet;
-use fields::{Fields, Read, color, frames, list, number, parsed, text, truth, unexpected, whole};
-use node::{Node, Value, Wrong};
+use fields::{Fields, Read, color, frames, integer, list, number, parsed, text, truth, unexpected, whole};
+use node::{Node, Value, Wrong, place_of};
 use std::io::Read as _;
 use std::path::{Path, PathBuf};
 
 /// What a job file says.
 #[derive(Debug, Default)]
 pub(super) struct JobFile {
+    /// The file itself; empty where there is none.
+    path: PathBuf,
     pub(super) name: Option<String>,
     pub(super) sequence: Option<PathBuf>,
     pub(super) layers: Vec<LayerFile>,
     pub(super) frames: Option<FrameSet>,
+    /// Where those stand, as it follows the file's name.
+    pub(super) frames_at: String,
     pub(super) folder: Option<PathBuf>,
     pub(super) priority: Option<i64>,
     pub(super) fps: Option<f64>,
     pub(super) clip: ClipChoice,
     pub(super) options: Options,
+    /// Where `bits` stand.
+    pub(super) bits_at: Option<String>,
     pub(super) overrides: Vec<Override>,
+}
+
+impl JobFile {
+    /// The file itself.
+    pub(super) fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Something wrong at a place in the file that shows only beside what is on the disk or in other keys.
+    pub(super) fn wrong(&self, place: &str, text: String) -> JobError {
+        JobError::File { path: self.path.clone(), place: place.to_string(), text }
+    }
 }
 
 /// One layer as the job file gives it.
@@ -64,9 +83,13 @@ const OUTSIDES: [(&str, Outside); 3] =
 #[derive(Debug)]
 pub(super) struct Override {
     pub(super) frames: Option<FrameSet>,
+    /// Where it stands.
+    pub(super) line: u32,
     /// On the stem.
     pub(super) files: Option<Pattern>,
     pub(super) options: Options,
+    /// Where its `bits` stand.
+    pub(super) bits_at: Option<String>,
 }
 
 /// No job file is larger.
@@ -74,17 +97,32 @@ const MAX_BYTES: u64 = 1 << 20;
 
 /// Reads a job file; paths in it are relative to its folder.
 pub(super) fn read(path: &Path) -> Result<JobFile, JobError> {
-    let unreadable = |source| JobError::Unreadable { path: path.to_path_buf(), source };
+    let unreadable = |cause| JobError::Unreadable { path: path.to_path_buf(), cause };
     let wrong = |place: String, text: String| JobError::File { path: path.to_path_buf(), place, text };
-    let mut yaml = String::new();
+    let mut bytes = Vec::new();
     let file = std::fs::File::open(path).map_err(unreadable)?;
-    file.take(MAX_BYTES + 1).read_to_string(&mut yaml).map_err(unreadable)?;
-    if yaml.len() as u64 > MAX_BYTES {
+    file.take(MAX_BYTES + 1).read_to_end(&mut bytes).map_err(unreadable)?;
+    if bytes.len() as u64 > MAX_BYTES {
         return Err(wrong(String::new(), format!("is longer than the {MAX_BYTES} bytes of any job file")));
     }
     // what the file says may be for a terminal to obey
     let plain = |text: String| text.replace(char::is_control, "\u{fffd}");
-    parse(&yaml, path).map_err(|e| wrong(format!(":{}:{}", e.line, e.column), plain(e.to_string())))
+    let read = decoded(bytes).and_then(|yaml| parse(&yaml, path));
+    read.map_err(|e| wrong(format!(":{}:{}", e.line, e.column), plain(e.to_string())))
+}
+
+/// The text of a file, which is UTF-8.
+fn decoded(bytes: Vec<u8>) -> Read<String> {
+    let wrong = |line, column, text: &str| Err(Wrong { line, column, key: None, text: text.to_string() });
+    if bytes.starts_with(b"\xFF\xFE") || bytes.starts_with(b"\xFE\xFF") {
+        return wrong(1, 1, "is UTF-16 text; save it as UTF-8");
+    }
+    String::from_utf8(bytes).or_else(|e| {
+        let text = String::from_utf8_lossy(&e.as_bytes()[..e.utf8_error().valid_up_to()]);
+        let line = text.split('\n').count();
+        let column = 1 + text.rsplit('\n').next().map_or(0, |last| last.chars().count());
+        wrong(line as u64, column as u64, "is not UTF-8 text; save it as UTF-8")
+    })
 }
 
 /// Keys that the job and its overrides share.
@@ -131,20 +169,24 @@ fn parse(yaml: &str, said_in: &Path) -> Read<JobFile> {
     }
     let path = |node: &Node| path(node, said_in);
     let mut file = JobFile {
+        path: said_in.to_path_buf(),
         name: job.get("name", plain_name)?,
         sequence: job.get("sequence", path)?,
         layers: job.get("layers", |node| layers(node, said_in))?.unwrap_or_default(),
         frames: job.get("frames", frames)?,
-        priority: job.get("priority", whole(limits::FRAME))?.map(|x| x as i64),
+        frames_at: job.node("frames").map(place_of).unwrap_or_default(),
+        priority: job.get("priority", integer)?,
         fps: job.get("fps", number(limits::FPS))?,
         clip: job.get("clip", text)?.map(|word| ClipChoice::from_word(&word)).unwrap_or_default(),
         options: scene_options(&job, said_in)?,
         overrides: job.get("overrides", list(|node| override_of(node, said_in)))?.unwrap_or_default(),
         folder: None,
+        bits_at: None,
     };
     job.get("output", |node| {
         let output = Fields::of(node, &[&["folder"], &PICTURE_KEYS])?;
         file.folder = output.get("folder", path)?;
+        file.bits_at = output.node("bits").map(place_of);
         picture_options(&output, &mut file.options)
     })?;
     Ok(file)
@@ -190,7 +232,7 @@ fn scene_options(map: &Fields<'_>, said_in: &Path) -> Read<Options> {
 }
 
 fn picture_options(map: &Fields<'_>, options: &mut Options) -> Read<()> {
-    options.name = map.get("name", text)?;
+    options.name = map.get("name", picture_name)?;
     options.format = map.get("format", parsed(settings::format_word))?;
     options.size = map.get("size", size)?;
     options.alpha = map.get("alpha", truth)?;
@@ -200,6 +242,13 @@ fn picture_options(map: &Fields<'_>, options: &mut Options) -> Read<()> {
     })?;
     options.quality = map.get("quality", whole(limits::QUALITY))?.map(|x| x as u8);
     Ok(())
+}
+
+/// A template of pictures' names.
+fn picture_name(node: &Node) -> Read<String> {
+    let name = text(node)?;
+    template::check(&name).map_err(|e| Wrong::at(node, e))?;
+    Ok(name)
 }
 
 fn size(node: &Node) -> Read<[u32; 2]> {
@@ -213,7 +262,7 @@ fn size(node: &Node) -> Read<[u32; 2]> {
 fn background(node: &Node, said_in: &Path) -> Read<Background> {
     match node.value {
         Value::Text(_) => path(node, said_in).map(Background::File),
-        Value::Number(_) | Value::List(_) => color(node).map(Background::Color),
+        Value::Number(_) | Value::Long(_) | Value::List(_) => color(node).map(Background::Color),
         _ => Err(unexpected(node, "a colour, as [0, 0, 0], or a picture's file, as sky.hdr")),
     }
 }
@@ -231,7 +280,14 @@ fn override_of(node: &Node, said_in: &Path) -> Read<Override> {
     let map = Fields::of(node, &[&["frames", "files"], &SCENE_KEYS, &PICTURE_KEYS])?;
     let mut options = scene_options(&map, said_in)?;
     picture_options(&map, &mut options)?;
-    Ok(Override { frames: map.get("frames", frames)?, files: map.get("files", pattern)?, options })
+    let bits_at = map.node("bits").map(place_of);
+    Ok(Override {
+        frames: map.get("frames", frames)?,
+        line: u32::try_from(node.referenced.line()).unwrap_or(u32::MAX),
+        files: map.get("files", pattern)?,
+        options,
+        bits_at,
+    })
 }
 
 fn pattern(node: &Node) -> Read<Pattern> {
@@ -260,7 +316,7 @@ fn layer(node: &Node, said_in: &Path) -> Read<LayerFile> {
     };
     map.get("frames", |node| {
         let map = Fields::of(node, &[&["start", "step", "outside"]])?;
-        layer.start = map.get("start", whole(limits::FRAME))?.map(|x| x as i64);
+        layer.start = map.get("start", integer)?;
         layer.step = map.get("step", step)?.unwrap_or(1);
         layer.outside = map.get("outside", parsed(|w| one_of(&OUTSIDES, w)))?.unwrap_or_default();
         Ok(())
@@ -269,7 +325,7 @@ fn layer(node: &Node, said_in: &Path) -> Read<LayerFile> {
 }
 
 fn step(node: &Node) -> Read<i64> {
-    match whole(limits::FRAME)(node)? as i64 {
+    match integer(node)? {
         0 => Err(Wrong::at(node, "a step of 0 never leaves the first frame; leave it out or give another")),
         step => Ok(step),
     }

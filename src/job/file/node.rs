@@ -13,9 +13,22 @@ pub(super) enum Value {
     Null,
     Bool(bool),
     Number(f64),
+    /// A whole number that f64 may not hold.
+    Long(i64),
     Text(String),
     List(Vec<Node>),
     Map(Vec<(Spanned<String>, Node)>),
+}
+
+impl Value {
+    /// The number nearest to a number.
+    pub(super) fn number(&self) -> Option<f64> {
+        match *self {
+            Self::Number(x) => Some(x),
+            Self::Long(x) => Some(x as f64),
+            _ => None,
+        }
+    }
 }
 
 /// What is wrong, and where: line and column from 1.
@@ -34,6 +47,11 @@ impl Wrong {
         let place = node.referenced;
         Self { line: place.line(), column: place.column(), key: None, text: text.into() }
     }
+}
+
+/// Where a value stands, as it follows a file's name: `:LINE:COLUMN`.
+pub(super) fn place_of(node: &Node) -> String {
+    format!(":{}:{}", node.referenced.line(), node.referenced.column())
 }
 
 impl fmt::Display for Wrong {
@@ -66,11 +84,27 @@ pub(super) fn parse(text: &str) -> Result<Node, Wrong> {
             serde_yaml::Error::Budget { .. } => {
                 "is too much for a job file with all that its aliases stand for".to_string()
             }
+            serde_yaml::Error::MultipleDocuments { .. } => {
+                "multiple YAML documents, parted by `---`; a job file is one: remove the others".to_string()
+            }
+            cause if let Some((line, column)) = indenting_tab(text, line, &cause.to_string()) => {
+                let text = "a tab indents this line; in YAML only blanks do".to_string();
+                return Wrong { line, column, key: None, text };
+            }
             // the place stands in front already
             cause => cause.to_string().split(" at line ").next().unwrap_or_default().to_string(),
         };
         Wrong { line, column, key: None, text }
     })
+}
+
+/// Where a tab stands among the blanks before the line of an error; where the library speaks of a tab, before that line or
+/// a later one: it may name the value before it.
+fn indenting_tab(text: &str, line: u64, told: &str) -> Option<(u64, u64)> {
+    let is_meant = |number: u64| number == line || (number > line && told.contains("found a tab"));
+    let tab = |line: &str| line.find(|c| c != ' ').filter(|&at| line[at..].starts_with('\t'));
+    let mut lines = (1..).zip(text.lines()).filter(|(number, _)| is_meant(*number));
+    lines.find_map(|(number, line)| tab(line).map(|at| (number, at as u64 + 1)))
 }
 
 impl<'de> Deserialize<'de> for Value {
@@ -80,6 +114,9 @@ impl<'de> Deserialize<'de> for Value {
 }
 
 struct AnyValue;
+
+/// All whole numbers up to this are f64.
+const EXACT: u64 = 1 << 53;
 
 impl<'de> Visitor<'de> for AnyValue {
     type Value = Value;
@@ -97,11 +134,12 @@ impl<'de> Visitor<'de> for AnyValue {
     }
 
     fn visit_i64<E>(self, x: i64) -> Result<Value, E> {
-        Ok(Value::Number(x as f64))
+        Ok(if x.unsigned_abs() <= EXACT { Value::Number(x as f64) } else { Value::Long(x) })
     }
 
     fn visit_u64<E>(self, x: u64) -> Result<Value, E> {
-        Ok(Value::Number(x as f64))
+        let is_exact = x <= EXACT;
+        Ok(i64::try_from(x).ok().filter(|_| !is_exact).map_or(Value::Number(x as f64), Value::Long))
     }
 
     fn visit_f64<E>(self, x: f64) -> Result<Value, E> {
@@ -135,6 +173,7 @@ impl fmt::Display for Value {
             Self::Null => f.write_str("nothing"),
             Self::Bool(x) => write!(f, "{x}"),
             Self::Number(x) => write!(f, "the number {x}"),
+            Self::Long(x) => write!(f, "the number {x}"),
             Self::Text(x) => write!(f, "the text `{x}`"),
             Self::List(list) => write!(f, "a list of {}", list.len()),
             Self::Map(_) => f.write_str("a map"),

@@ -1,20 +1,27 @@
 //! What the job file says of cameras, lights, materials and transforms.
 
 use super::fields::{
-    Fields, Read, color, direction, elements, entries, list, number, parsed, text, triple, vector, whole,
+    Fields, Read, about, color, direction, elements, entries, integer, list, number, parsed, text, triple,
+    unexpected, vector, whole,
 };
 use super::node::{Node, Value, Wrong};
-use crate::format::{MaterialOverride, is_mtl_word};
+use crate::format::{MaterialOverride, mtl_word_accepts, mtl_word_takes, mtl_words};
 use crate::job::options::{CameraChoice, LightChoice, Options, limits};
 use crate::job::settings::{FALLOFFS, INTERPOLATIONS, up_word};
 use crate::job::track::{CameraPose, CameraTrack, Key, Placed, Transform};
-use crate::job::words::one_of;
+use crate::job::words::{listed, nearest, one_of};
 use crate::math::{DVec3, Vec3};
 use crate::scene::{Falloff, Light};
 use std::path::Path;
 
 fn is_auto(node: &Node) -> bool {
     matches!(&node.value, Value::Text(text) if text == "auto")
+}
+
+/// ` (did you mean `auto`?)` where a word is near.
+fn or_auto(node: &Node) -> String {
+    let Value::Text(word) = &node.value else { return String::new() };
+    nearest(word, std::iter::once("auto"))
 }
 
 /// What is up: a word or three numbers.
@@ -24,8 +31,10 @@ pub(super) fn up(node: &Node) -> Read<DVec3> {
 
 /// `auto`, a camera, keys of a camera, or what is to be changed of the auto camera.
 pub(super) fn camera(node: &Node, options: &mut Options) -> Read<CameraChoice> {
-    if is_auto(node) {
-        return Ok(CameraChoice::Auto);
+    match node.value {
+        _ if is_auto(node) => return Ok(CameraChoice::Auto),
+        Value::Map(_) => {}
+        _ => return Err(unexpected(node, &format!("`auto` or a map{}", or_auto(node)))),
     }
     let map = Fields::of(node, &[&["eye", "look_at", "up", "fov", "keys", "interpolate", "gltf"]])?;
     if let Some(gltf) = map.node("gltf") {
@@ -46,7 +55,7 @@ pub(super) fn camera(node: &Node, options: &mut Options) -> Read<CameraChoice> {
             return Err(Wrong::at(node, "a camera with keys has eye and look_at in the keys"));
         }
         Some(_) => map.need("keys", |node| keys(node, &["eye", "look_at", "up", "fov"], pose))?,
-        None if is_placed => vec![Key { frame: 0.0, value: pose(&map, node)? }],
+        None if is_placed => vec![Key { frame: 0, value: pose(&map, node)? }],
         None => {
             options.up = up.or(options.up);
             options.fov = fov_deg.or(options.fov);
@@ -77,7 +86,7 @@ fn keys<T>(node: &Node, known: &[&str], read: impl Fn(&Fields<'_>, &Node) -> Rea
     let mut keys: Vec<Key<T>> = Vec::new();
     for node in elements(node)? {
         let map = Fields::of(node, &[&["frame"], known])?;
-        let frame = map.need("frame", whole(limits::FRAME))?;
+        let frame = map.need("frame", integer)?;
         if keys.iter().any(|k| k.frame == frame) {
             return Err(Wrong::at(node, format!("there is another key at frame {frame}; remove one")));
         }
@@ -86,7 +95,7 @@ fn keys<T>(node: &Node, known: &[&str], read: impl Fn(&Fields<'_>, &Node) -> Rea
     if keys.is_empty() {
         return Err(Wrong::at(node, "the list of keys is empty"));
     }
-    keys.sort_by(|a, b| a.frame.total_cmp(&b.frame));
+    keys.sort_by_key(|key| key.frame);
     Ok(keys)
 }
 
@@ -102,7 +111,7 @@ pub(super) fn placed(node: &Node) -> Read<Placed> {
         })
     };
     let keys = match map.get("keys", |node| keys(node, &PARTS, transform))? {
-        None => vec![Key { frame: 0.0, value: transform(&map, node)? }],
+        None => vec![Key { frame: 0, value: transform(&map, node)? }],
         Some(_) if PARTS.iter().any(|part| map.node(part).is_some()) => {
             let text = "a transform with keys has translate, rotate and scale in the keys";
             return Err(Wrong::at(node, text));
@@ -114,7 +123,11 @@ pub(super) fn placed(node: &Node) -> Read<Placed> {
 
 /// `auto`, or a list of lights.
 pub(super) fn lights(node: &Node) -> Read<LightChoice> {
-    if is_auto(node) { Ok(LightChoice::Auto) } else { list(light)(node).map(LightChoice::Given) }
+    match node.value {
+        _ if is_auto(node) => Ok(LightChoice::Auto),
+        Value::List(_) => list(light)(node).map(LightChoice::Given),
+        _ => Err(unexpected(node, &format!("`auto`, or a list of lights, [] for none{}", or_auto(node)))),
+    }
 }
 
 fn light(node: &Node) -> Read<Light> {
@@ -182,24 +195,42 @@ fn area(node: &Node) -> Read<Light> {
 pub(super) fn materials(node: &Node, said_in: &Path) -> Read<Vec<MaterialOverride>> {
     let mut materials = Vec::new();
     for (name, node) in entries(node)? {
-        let mut words = Vec::new();
-        for (word, node) in entries(node)? {
-            if !is_mtl_word(&word.value) {
-                let text = format!("material {}: `{}` is not a word of an MTL", name.value, word.value);
-                return Err(Wrong::at(word, text));
-            }
-            words.push((word.value.clone(), behind(node)?));
-        }
+        let words = statements(node).map_err(|wrong| about(&name.value, wrong))?;
         let name = name.value.clone().into_bytes();
         materials.push(MaterialOverride { name, words, said_in: said_in.to_path_buf() });
     }
     Ok(materials)
 }
 
+/// The words for one material, each with a value that it takes.
+fn statements(node: &Node) -> Read<Vec<(String, String)>> {
+    let mut words = Vec::new();
+    for (word, node) in entries(node)? {
+        let Some(wanted) = mtl_word_takes(&word.value) else {
+            let hint = nearest(&word.value, mtl_words());
+            let allowed = listed(mtl_words());
+            let text = format!("`{}` is not a word of an MTL{hint}; allowed: {allowed}", word.value);
+            return Err(Wrong::at(word, text));
+        };
+        let about_word = |wrong| about(&word.value, wrong);
+        let value = match node.value {
+            Value::Number(_) | Value::Long(_) | Value::Text(_) | Value::List(_) => {
+                behind(node).map_err(about_word)?
+            }
+            _ => return Err(about_word(unexpected(node, &wanted))),
+        };
+        if !mtl_word_accepts(&word.value, &value) {
+            return Err(about_word(unexpected(node, &wanted)));
+        }
+        words.push((word.value.clone(), value));
+    }
+    Ok(words)
+}
+
 /// A number, text, or a list of them, as an MTL has it behind a word.
 fn behind(node: &Node) -> Read<String> {
     match &node.value {
-        Value::Number(_) => Ok(number(limits::NUMBER)(node)?.to_string()),
+        Value::Number(_) | Value::Long(_) => Ok(number(limits::NUMBER)(node)?.to_string()),
         Value::List(_) => Ok(list(behind)(node)?.join(" ")),
         _ => text(node),
     }

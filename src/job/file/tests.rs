@@ -82,7 +82,10 @@ fn errors_have_line_and_column_what_is_allowed_and_the_nearest_name() {
         ("camera:\n  keys:\n    - {frame: 1, eye: 1, look_at: 0}", (5, 23), &["eye", "three numbers"]),
         ("camera: {gltf: Main, up: z}", (3, 22), &["a glTF camera has no `up`"]),
         ("camera: {gltf: 3}", (3, 16), &["text"]),
-        ("camera: front", (3, 9), &["camera", "a map", "front"]),
+        ("camera: front", (3, 9), &["camera", "`auto` or a map", "front"]),
+        ("camera: atuo", (3, 9), &["did you mean `auto`", "atuo"]),
+        ("lights: none", (3, 9), &["`auto`, or a list of lights, [] for none", "none"]),
+        ("lights: auot", (3, 9), &["did you mean `auto`"]),
         ("samples: many", (3, 10), &["samples", "a whole number from 1 to 65536", "many"]),
         ("samples: 0", (3, 10), &["samples", "out of range", "1 to 65536"]),
         ("samples: 1.5", (3, 10), &["samples", "whole"]),
@@ -112,6 +115,8 @@ fn errors_have_line_and_column_what_is_allowed_and_the_nearest_name() {
         ("background: [0, -1, 0]", (3, 13), &["background", "out of range"]),
         ("background: {sky: 1}", (3, 13), &["background", "a colour", "sky.hdr"]),
         ("output: {format: gif}", (3, 18), &["format", "gif", "png"]),
+        ("output: {name: \"{foo}\"}", (3, 16), &["output.name", "{foo}", "{stem}"]),
+        ("overrides: [{name: a//b}]", (3, 20), &["a//b"]),
         ("output: {bits: 12}", (3, 16), &["bits", "8 or 16"]),
         ("output: {size: [1280]}", (3, 16), &["size", "two numbers"]),
         ("output: {size: [1280, 0]}", (3, 23), &["size", "out of range"]),
@@ -119,7 +124,16 @@ fn errors_have_line_and_column_what_is_allowed_and_the_nearest_name() {
         ("output: 3", (3, 9), &["output", "a map"]),
         ("frames: 1-", (3, 9), &["frames", "1-"]),
         ("aov: [depth, norml]", (3, 6), &["aov", "norml", "did you mean `normal`"]),
-        ("materials: {a: {Kx: 1}}", (3, 17), &["material a", "Kx"]),
+        ("materials: {a: {Kx: 1}}", (3, 17), &["materials.a: `Kx`"]),
+        ("materials: {a: {Nii: 1.5}}", (3, 17), &["`Nii`", "did you mean `Ni`", "allowed: Ka, Kd", "illum"]),
+        ("materials: {a: {illum: 11}}", (3, 24), &["materials.a.illum", "a whole number from 0 to 10", "11"]),
+        ("materials: {a: {Kd: red}}", (3, 21), &["materials.a.Kd", "three numbers, or one", "`red`"]),
+        ("materials: {a: {Kd: [1, 2]}}", (3, 21), &["three numbers, or one", "a list of 2"]),
+        ("materials: {a: {Kd: [1, 2, 3, 4]}}", (3, 21), &["three numbers, or one", "a list of 4"]),
+        ("materials: {a: {d: 2}}", (3, 20), &["a number from 0 to 1", "the number 2"]),
+        ("materials: {a: {d: true}}", (3, 20), &["a number from 0 to 1", "true"]),
+        ("materials: {a: {Ni: [1, 2, 3]}}", (3, 21), &["expected a number,", "a list of 3"]),
+        ("overrides:\n  - materials: {a: {map_Kd: -s 2}}", (4, 29), &["a file, with options"]),
         ("ambient: [0, -1, 0]", (3, 10), &["ambient", "out of range"]),
         ("overrides:\n  - {frames: 1, samples: 2}\n  - {frames: 2, samples: x}", (5, 26), &["samples"]),
         ("overrides: [{folder: a}]", (3, 14), &["unknown key `folder`"]),
@@ -159,13 +173,28 @@ fn errors_of_layers_and_of_the_whole() {
             "another key at frame 1",
         ),
         ("layers: [{sequence: a, transform: {keys: [{frame: 1}], scale: 2}}]\n", (1, 35), "in the keys"),
-        ("sequence: a\n---\nsequence: b\n", (3, 1), "multiple"),
+        ("sequence: a\n---\nsequence: b\n", (3, 1), "multiple YAML documents, parted by `---`"),
+        ("sequence: a\n\tsamples: 4\n", (2, 1), "a tab indents this line"),
+        ("sequence: a\noutput:\n\tbits: 8\n", (3, 1), "a tab indents this line"),
+        ("sequence: a\n\n# so\n  \tsamples: 4\n", (4, 3), "a tab indents this line"),
     ];
     for (yaml, place, words) in cases {
         let e = parse(yaml, Path::new("")).unwrap_err();
         let is_right = (e.line, e.column) == *place && e.to_string().contains(words);
         assert!(is_right, "{yaml} → {}:{}: {e}", e.line, e.column);
     }
+}
+
+#[test]
+fn a_job_file_is_utf_8() {
+    let refused = |bytes: &[u8]| {
+        let wrong = decoded(bytes.to_vec()).unwrap_err();
+        format!("{}:{}: {wrong}", wrong.line, wrong.column)
+    };
+    assert_eq!(refused(b"\xff\xfes\0e\0"), "1:1: is UTF-16 text; save it as UTF-8");
+    assert_eq!(refused(b"name: a\nsequence: w\xf6\n"), "2:12: is not UTF-8 text; save it as UTF-8");
+    assert_eq!(refused(b"name: \xc3\xb6\xff"), "1:8: is not UTF-8 text; save it as UTF-8");
+    assert_eq!(decoded("sequence: wö".into()).unwrap(), "sequence: wö");
 }
 
 #[test]

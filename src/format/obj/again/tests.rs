@@ -120,6 +120,17 @@ fn exported() -> String {
     text + "# " + &"-".repeat(80) + "\n"
 }
 
+#[test]
+fn a_zero_byte_fails_a_frame_however_it_is_read() {
+    let (options, library) = (ReadOptions::default(), library());
+    let before = same(TEXTS[0].as_bytes(), None, &options, &library).unwrap().parsed.unwrap();
+    for behind in ["# so\0\n", "g \0\n", "\0\0\0\0", "ny\0\n"] {
+        let text = format!("{}{behind}", TEXTS[0]);
+        assert!(same(text.as_bytes(), Some(&before), &options, &library).is_none(), "{behind:?}");
+    }
+    assert!(same(b"<html>\n<p>f 1 2 3\n", Some(&before), &options, &library).is_none());
+}
+
 /// Splitmix64 (Steele et al. 2014).
 struct Random(u64);
 

@@ -95,7 +95,7 @@ fn no_byte_of_an_entry_can_do_harm() {
             };
             taken += 1;
             let mut warnings = stored.warnings(&path);
-            let shape = stored.into_shape(&library, &path, &mut warnings);
+            let shape = stored.into_shape(&library, &path, &|_, _| None, &mut warnings);
             let (geometry, _, next) = shape.keep(Some(text.as_bytes().to_vec()));
             assert!(
                 geometry
