@@ -57,6 +57,32 @@ fn a_folder_and_archives_give_what_render_gives() {
 }
 
 #[test]
+fn a_picture_that_is_gone_is_rendered_again() {
+    let w = Watched::new();
+    let folder = w.job("walk", 3);
+    w.job("other", 1);
+    let want = w.wanted(&folder, &[]);
+    w.once(&[], 0);
+    for listing in [true, false] {
+        fs::remove_file(w.path("done/walk/wave_0002.png")).unwrap();
+        if !listing {
+            // of an earlier version, which kept none
+            fs::remove_file(w.path("done/walk/.rentix/pictures")).unwrap();
+        }
+        let said = w.once(&["--json"], 0).stdout;
+        assert!(said.contains("it is rendered again"), "{said}");
+        assert_eq!(said.matches("\"status\":\"rendered\"").count(), 1, "{said}");
+        assert!(!said.contains("\"job\":\"other\""), "{said}");
+        assert_same(&want, &w.done("walk"), "again");
+        assert_eq!(w.status("walk")["frames"], serde_json::json!({"done": 3, "failed": 0, "all": 3}));
+    }
+    // what else lies there, or is not there, is no reason
+    fs::write(w.path("done/walk/film.png"), "").unwrap();
+    let said = w.once(&["--json"], 0).stdout;
+    assert!(!said.contains("\"state\""), "{said}");
+}
+
+#[test]
 fn what_changed_is_a_new_run_of_the_same_job() {
     let w = Watched::new();
     let folder = w.job("walk", 2);

@@ -6,6 +6,7 @@ use super::follow_run;
 use super::job::{self, Place, Unfit};
 use crate::device::Stop;
 use crate::job::{Job, Request};
+use crate::output;
 use crate::run::{self, DeviceReport, Event, Fleet, Outcome, RunOptions};
 use std::collections::HashSet;
 use std::ffi::OsString;
@@ -102,7 +103,15 @@ fn one(order: &Order, options: &RunOptions, fleet: &Fleet, messages: &Sender<Mes
         let job = prepared(order).map_err(|unfit| not_prepared(&unfit))?;
         let priority = order.priority.clamp(i32::MIN.into(), i32::MAX.into()) as i32;
         let options = RunOptions { priority, ..options.clone() };
-        run::render(&job, &options, fleet, &order.stop, &mut tell).map_err(|e| Told::Unfit(e.to_string()))
+        let unfit = |error: String| Told::Unfit(error);
+        let outcome = run::render(&job, &options, fleet, &order.stop, &mut tell)
+            .map_err(|error| unfit(error.to_string()))?;
+        if order.only.is_none() && !outcome.stopped && outcome.failed().next().is_none() {
+            // a later daemon tells by it whether they are there still
+            let files = job.pictures.iter().flat_map(run::files_of);
+            output::keep_listing(&job.folder, files).map_err(|error| unfit(error.to_string()))?;
+        }
+        Ok(outcome)
     }));
     match rendered {
         Ok(Ok(outcome)) => Told::Ended(Box::new(outcome)),

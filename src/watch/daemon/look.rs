@@ -322,12 +322,16 @@ impl Daemon<'_> {
 
     /// Goes on with what an earlier daemon, or another one, wrote.
     fn go_on(&mut self, id: u64, known: Status, seen: &Seen) -> bool {
-        let run = run_word(seen);
+        let has_ended = known.ended(&run_word(seen));
+        let gone = if has_ended { known.gone(&self.options.out.join(&known.job)) } else { None };
         let Some(entry) = self.entries.get_mut(&id) else { return false };
         entry.named = true;
-        let has_ended = known.ended(&run);
         entry.status = known;
-        if has_ended {
+        if let Some(gone) = gone {
+            entry.status.run.clear();
+            entry.enter(State::Received, None);
+            self.note(&format!("{gone}; it is rendered again"));
+        } else if has_ended {
             entry.phase = Phase::Ended;
         }
         true
