@@ -141,6 +141,35 @@ fn render_farms_read_progress() {
     assert!(told.ends_with("openjd_fail: 1 frames failed\n"), "{told}");
 }
 
+#[test]
+fn compare_says_what_differs_and_what_it_cannot_tell() {
+    let t = tempfile::tempdir().unwrap();
+    let t = t.path();
+    let input = wave(&t.join("w"), 2, 4, 7);
+    let said = |status: i32, wanted: &str| {
+        let run = run(t, ["compare".as_ref(), t.join("a").as_os_str(), t.join("b").as_os_str()]);
+        assert!(run.status == status && run.stderr.contains(wanted), "{}{}", run.stdout, run.stderr);
+        run.stdout
+    };
+    for (folder, format) in [("a", "jp2"), ("b", "jp2"), ("a", "ras")] {
+        render(t, &input, folder, &["--size", "32x18", "--format", format], 0);
+    }
+    // the same bytes are equal whatever they are
+    let told = said(1, "2 pictures compared, 0 differ, 2 are in one folder only");
+    assert!(told.contains("wave_0001.ras: is only in "), "{told}");
+    render(t, &input, "b", &["--size", "32x18", "--format", "ras"], 0);
+    said(0, "4 pictures compared, 0 differ\n");
+    let picture = t.join("b/wave_0002.ras");
+    let mut bytes = std::fs::read(&picture).unwrap();
+    bytes[99] ^= 0xff;
+    std::fs::write(&picture, bytes).unwrap();
+    let told = said(1, "4 pictures compared, 1 differ\n");
+    assert!(told.contains("wave_0002.ras: max "), "{told}");
+    std::fs::write(t.join("b/wave_0001.jp2"), "torn").unwrap();
+    let told = said(2, "3 pictures compared, 1 differ, 1 cannot be read\n");
+    assert!(told.contains("a/wave_0001.jp2: is not a picture that can be compared"), "{told}");
+}
+
 /// Nine panes of refracting glass, each entered and none left.
 #[test]
 fn media_that_are_too_deep_are_told_of() {

@@ -48,6 +48,11 @@ pub struct Comparison {
     pub flip: f64,
 }
 
+impl Comparison {
+    /// That of equal pictures.
+    pub const EQUAL: Self = Self { max: 0.0, rmse: 0.0, psnr: None, flip: 0.0 };
+}
+
 /// Why two pictures cannot be compared value by value.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum Mismatch {

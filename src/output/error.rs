@@ -1,6 +1,5 @@
 //! What can go wrong with pictures and records.
 
-use crate::film::compare::Mismatch;
 use std::io;
 use std::path::{Path, PathBuf};
 
@@ -42,7 +41,7 @@ pub enum OutputError {
         why: String,
     },
     /// A file is not a picture that can be read.
-    #[error("{}: is not a picture that can be compared: {why}; all formats but jp2 and sr are read", path.display())]
+    #[error("{}: is not a picture that can be compared: {why}; all formats but jp2 are read", path.display())]
     Decode {
         /// Which.
         path: PathBuf,
@@ -52,9 +51,6 @@ pub enum OutputError {
     /// A folder and a file are to be compared.
     #[error("{} and {}: one is a folder, the other is not; name two pictures or two folders", .0.display(), .1.display())]
     FolderAndFile(PathBuf, PathBuf),
-    /// Two pictures cannot be compared value by value.
-    #[error(transparent)]
-    Mismatch(#[from] Mismatch),
 }
 
 impl OutputError {

@@ -1,8 +1,8 @@
-//! Pictures read back from files, to be compared: all formats that are written but JPEG 2000 and Sun raster, known by
-//! their first bytes.
+//! Pictures read back from files, to be compared: all formats that are written but JPEG 2000, known by their first bytes.
 
 use super::encoding::Format;
 use super::error::OutputError;
+use super::sun;
 use crate::film::compare::{Channel, Picture, Samples};
 use exr::meta::header::Header;
 use exr::prelude::{FlatSamples, MetaData, ReadChannels, ReadLayers, read};
@@ -22,15 +22,26 @@ const EXR_MAGIC: [u8; 4] = [0x76, 0x2f, 0x31, 0x01];
 
 /// Reads a picture. A broken file is an error, also where a decoder panics on it.
 pub fn read_picture(path: &Path) -> Result<Picture, OutputError> {
-    let bytes = read_bytes(path)?;
-    let decode =
-        || if bytes.starts_with(&EXR_MAGIC) { decode_exr(&bytes) } else { decode_image(&bytes, path) };
+    decode(&read_bytes(path)?, path)
+}
+
+/// The picture that a file's bytes are.
+pub(super) fn decode(bytes: &[u8], path: &Path) -> Result<Picture, OutputError> {
+    let decode = || {
+        if bytes.starts_with(&EXR_MAGIC) {
+            decode_exr(bytes)
+        } else if sun::is_sun(bytes) {
+            decode_sun(bytes)
+        } else {
+            decode_image(bytes, path)
+        }
+    };
     catch_unwind(AssertUnwindSafe(decode))
         .unwrap_or_else(|_| Err("the decoder failed on it".into()))
         .map_err(|why| OutputError::Decode { path: path.to_path_buf(), why })
 }
 
-fn read_bytes(path: &Path) -> Result<Vec<u8>, OutputError> {
+pub(super) fn read_bytes(path: &Path) -> Result<Vec<u8>, OutputError> {
     let mut bytes = Vec::new();
     let mut file = File::open(path).map_err(OutputError::read(path))?.take(PICTURE_BYTES_MAX + 1);
     file.read_to_end(&mut bytes).map_err(OutputError::read(path))?;
@@ -39,6 +50,12 @@ fn read_bytes(path: &Path) -> Result<Vec<u8>, OutputError> {
         return Err(OutputError::Decode { path: path.to_path_buf(), why });
     }
     Ok(bytes)
+}
+
+fn decode_sun(bytes: &[u8]) -> Result<Picture, String> {
+    let (size, codes) = sun::decode(bytes, SIDE_MAX)?;
+    let shares: Vec<u16> = codes.iter().map(|&code| 257 * u16::from(code)).collect();
+    Ok(Picture { size, channels: channels(&RGBA[..3], &shares, Samples::Share) })
 }
 
 fn decode_image(bytes: &[u8], path: &Path) -> Result<Picture, String> {
