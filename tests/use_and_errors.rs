@@ -170,6 +170,44 @@ fn compare_says_what_differs_and_what_it_cannot_tell() {
     assert!(told.contains("a/wave_0001.jp2: is not a picture that can be compared"), "{told}");
 }
 
+/// A pipe into which nobody writes is not waited for, and a device without end not read.
+#[test]
+#[cfg(unix)]
+fn what_is_no_plain_file_is_refused() {
+    let t = tempfile::tempdir().unwrap();
+    let t = t.path();
+    let path = |name: &str| t.join(name).to_str().unwrap().to_owned();
+    let fifo = |name: &str| {
+        let made = std::process::Command::new("mkfifo").arg(t.join(name)).status().unwrap();
+        assert!(made.success());
+        path(name)
+    };
+    let (job, picture, endless) = (fifo("job.yaml"), fifo("a.png"), path("endless.png"));
+    std::os::unix::fs::symlink("/dev/zero", &endless).unwrap();
+    let input = wave(&t.join("w"), 1, 4, 7);
+    let obj = input.join("wave_0001.obj").to_str().unwrap().to_owned();
+    for args in [
+        vec!["render", &job],
+        vec!["render", &obj, "--job", &job],
+        vec!["compare", &picture, &picture],
+        vec!["compare", &obj, &endless],
+        vec!["render", &obj, "--background", &picture, "-o", &path("out")],
+    ] {
+        let mut child = common::rentix(t).args(&args).stderr(std::process::Stdio::piped()).spawn().unwrap();
+        let since = std::time::Instant::now();
+        while child.try_wait().unwrap().is_none() {
+            if since.elapsed().as_secs() > 60 {
+                child.kill().unwrap();
+                panic!("{args:?} hangs");
+            }
+            std::thread::sleep(std::time::Duration::from_millis(20));
+        }
+        let ended = child.wait_with_output().unwrap();
+        let said = String::from_utf8_lossy(&ended.stderr);
+        assert!(ended.status.code() != Some(0) && said.contains("plain file"), "{args:?}: {said}");
+    }
+}
+
 /// Nine panes of refracting glass, each entered and none left.
 #[test]
 fn media_that_are_too_deep_are_told_of() {

@@ -181,6 +181,9 @@ pub enum JobError {
         /// What the system said.
         source: io::Error,
     },
+    /// A pipe or a device stands where a file should.
+    #[error("{}: is not a plain file; name a job file", .0.display())]
+    NotAFile(PathBuf),
     /// Two files for one frame.
     #[error("frame {number} is given twice: {} and {}; remove one, or use --one-sequence", first.display(), second.display())]
     TwoOfANumber {

@@ -4,10 +4,10 @@ use super::encoding::Format;
 use super::error::OutputError;
 use super::sun;
 use crate::film::compare::{Channel, Picture, Samples};
+use crate::format::open_plain;
 use exr::meta::header::Header;
 use exr::prelude::{FlatSamples, MetaData, ReadChannels, ReadLayers, read};
 use image::{DynamicImage, ImageFormat, ImageReader, Limits};
-use std::fs::File;
 use std::io::{Cursor, Read};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
@@ -42,9 +42,11 @@ pub(super) fn decode(bytes: &[u8], path: &Path) -> Result<Picture, OutputError> 
 }
 
 pub(super) fn read_bytes(path: &Path) -> Result<Vec<u8>, OutputError> {
+    let Some((file, _)) = open_plain(path).map_err(OutputError::read(path))? else {
+        return Err(OutputError::Decode { path: path.to_path_buf(), why: "it is no plain file".into() });
+    };
     let mut bytes = Vec::new();
-    let mut file = File::open(path).map_err(OutputError::read(path))?.take(PICTURE_BYTES_MAX + 1);
-    file.read_to_end(&mut bytes).map_err(OutputError::read(path))?;
+    file.take(PICTURE_BYTES_MAX + 1).read_to_end(&mut bytes).map_err(OutputError::read(path))?;
     if bytes.len() as u64 > PICTURE_BYTES_MAX {
         let why = format!("it holds more than {PICTURE_BYTES_MAX} bytes");
         return Err(OutputError::Decode { path: path.to_path_buf(), why });

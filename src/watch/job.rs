@@ -26,8 +26,8 @@ pub(super) enum Unfit {
     Job(#[from] JobError),
     #[error(transparent)]
     Frame(#[from] FormatError),
-    #[error("{}: is a link; put the job file itself there", .0.display())]
-    Link(PathBuf),
+    #[error("{}: is no plain file; put the job file itself there", .0.display())]
+    NotAFile(PathBuf),
     #[error("{}: cannot be used: {source}; look whether it is still there and may be read", path.display())]
     Unusable { path: PathBuf, source: io::Error },
 }
@@ -102,7 +102,7 @@ fn job_file(root: &Path) -> Result<Option<PathBuf>, Unfit> {
     for path in JOB_FILES.map(|name| root.join(name)) {
         match fs::symlink_metadata(&path) {
             Ok(meta) if meta.is_file() => return Ok(Some(path)),
-            Ok(_) => return Err(Unfit::Link(path)),
+            Ok(_) => return Err(Unfit::NotAFile(path)),
             Err(error) if error.kind() == io::ErrorKind::NotFound => {}
             Err(error) => return Err(unusable(&path)(error)),
         }
