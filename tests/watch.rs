@@ -383,7 +383,10 @@ fn a_running_daemon_sees_what_changes_and_what_is_cancelled() {
     fs::rename(&long, w.path("inbox/long")).unwrap();
     until("long", &|| is("long", "running", 0));
     fs::write(w.path("inbox/long.cancel"), "").unwrap();
+    let since = std::time::Instant::now();
     until("cancelled", &|| is("long", "cancelled", 0));
+    // it is told of, and not found by the next look at what rests, after 5 s
+    assert!(since.elapsed().as_secs() < 3, "{:?}", since.elapsed());
     w.job("short", 1);
     until("short", &|| is("short", "finished", 1));
     let kill = std::process::Command::new("kill").arg("-TERM").arg(child.id().to_string()).status().unwrap();

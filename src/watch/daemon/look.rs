@@ -6,7 +6,7 @@ use crate::watch::inbox::{self, Found, Kind};
 use crate::watch::settle::{Seen, Settling};
 use crate::watch::state::{State, Status, now_ms};
 use std::collections::HashSet;
-use std::ffi::OsString;
+use std::ffi::{OsStr, OsString};
 use std::io;
 use std::path::Path;
 use std::time::Duration;
@@ -57,8 +57,15 @@ impl Daemon<'_> {
             self.meet(found);
         }
         let now = self.now();
-        for name in self.hints.take() {
-            if let Some(entry) = self.by_file.get(&name).and_then(|id| self.entries.get_mut(id)) {
+        let hints = self.hints.take();
+        let mut hinted: Vec<u64> = hints.iter().filter_map(|name| self.by_file.get(name)).copied().collect();
+        let beside: HashSet<&OsStr> = hints.iter().filter_map(|name| inbox::said_of(name)).collect();
+        if !beside.is_empty() {
+            let is_meant = |file: &OsStr| inbox::names(file).any(|name| beside.contains(name));
+            hinted.extend(self.by_file.iter().filter(|(file, _)| is_meant(file)).map(|(_, id)| *id));
+        }
+        for id in hinted {
+            if let Some(entry) = self.entries.get_mut(&id) {
                 entry.due = entry.due.min(now.max(entry.rests));
             }
         }
