@@ -224,6 +224,34 @@ fn one_bad_frame_fails_its_job_and_the_others_stay() {
 }
 
 #[test]
+fn errors_of_archives_name_files_as_they_were_packed() {
+    let w = Watched::new();
+    let folder = w.path("walk");
+    wave(&folder, 2, 6, 8);
+    fs::write(folder.join("wave_0001.obj"), "v 0 0 0\nv 1 0 0\nf 1 2 3\n").unwrap();
+    let good = folder.join("wave_0002.obj");
+    fs::write(&good, "mtllib gone.mtl\n".to_owned() + &fs::read_to_string(&good).unwrap()).unwrap();
+    zip_of(&folder, &w.path("inbox/frame.zip"));
+    tar_of(&folder, &w.path("inbox/inner.tar"));
+    fs::write(folder.join("job.yaml"), "sequence: gone\n").unwrap();
+    zip_of(&folder, &w.path("inbox/job.zip"));
+    fs::write(folder.join("job.yaml"), "sequense: .\n").unwrap();
+    zip_of(&folder, &w.path("inbox/typo.zip"));
+    let told = w.once(&[], 1).stderr;
+    for (job, begins) in [
+        ("frame", "frame.zip: wave_0001.obj:3: "),
+        ("inner", "inner.tar: inner/wave_0001.obj:3: "),
+        ("job", "job.zip: gone"),
+        ("typo", "typo.zip: job.yaml:1:1: "),
+    ] {
+        let error = w.status(job)["error"].as_str().unwrap().to_owned();
+        assert!(error.starts_with(begins), "{error}");
+    }
+    assert!(told.contains("warning: frame.zip: ") && told.contains("gone.mtl"), "{told}");
+    assert!(!told.contains("unpacked"), "{told}");
+}
+
+#[test]
 fn a_followed_sequence_ends_as_the_whole_one_with_its_own_camera() {
     let w = Watched::new();
     let folder = w.job("sim", 4);

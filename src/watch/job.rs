@@ -7,7 +7,7 @@ use crate::job::{self, Job, JobError, Request};
 use std::ffi::OsStr;
 use std::fs;
 use std::io;
-use std::path::{Path, PathBuf};
+use std::path::{MAIN_SEPARATOR, Path, PathBuf};
 
 /// Names of the job file.
 const JOB_FILES: [&str; 2] = ["job.yaml", "job.yml"];
@@ -46,6 +46,23 @@ pub(super) struct Place {
     pub(super) room: PathBuf,
     /// Where its pictures go.
     pub(super) out: PathBuf,
+}
+
+impl Place {
+    /// A text about files that were unpacked, as whoever packed them knows them: `walk.zip: a.obj:2: …`.
+    pub(super) fn as_packed(&self, text: &str) -> String {
+        if self.kind == Kind::Folder {
+            return text.to_owned();
+        }
+        let archive = self.source.file_name().unwrap_or_default().to_string_lossy();
+        let real = self.room.canonicalize().unwrap_or_else(|_| self.room.clone());
+        let mut text = text.to_owned();
+        for room in [real, self.room.clone()].map(|room| room.display().to_string()) {
+            text = text.replace(&format!("{room}{MAIN_SEPARATOR}"), &format!("{archive}: "));
+            text = text.replace(&room, &archive);
+        }
+        text
+    }
 }
 
 /// The priority that a job asks for, if it does; an archive is looked through for it, and refused where it is bad.
