@@ -224,6 +224,25 @@ fn one_bad_frame_fails_its_job_and_the_others_stay() {
 }
 
 #[test]
+fn it_is_said_what_a_job_waits_for() {
+    use std::io::{BufRead, BufReader};
+    let w = Watched::new();
+    let part = w.job("walk", 1).join("wave_0002.obj.part");
+    fs::write(&part, "v 0").unwrap();
+    let mut command = common::rentix(w.t.path());
+    let mut daemon = command.args(w.args(&[])).stderr(std::process::Stdio::piped()).spawn().unwrap();
+    let mut said = String::new();
+    for line in BufReader::new(daemon.stderr.take().unwrap()).lines().map_while(Result::ok) {
+        if line.contains("waits for wave_0002.obj.part") {
+            fs::remove_file(&part).unwrap();
+        }
+        said += &line;
+    }
+    assert_eq!(said.matches("waits for").count(), 1, "{said}");
+    assert!(daemon.wait().unwrap().success() && w.status("walk")["state"] == "finished", "{said}");
+}
+
+#[test]
 fn errors_of_archives_name_files_as_they_were_packed() {
     let w = Watched::new();
     let folder = w.path("walk");

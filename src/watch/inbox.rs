@@ -156,6 +156,21 @@ pub(super) fn look(inbox: &Path, found: &Found) -> io::Result<Seen> {
     })
 }
 
+/// A file of a job whose name says that it is still being written.
+pub(super) fn unfinished(job: &Path) -> Option<PathBuf> {
+    let mut folders = vec![job.to_path_buf()];
+    while let Some(folder) = folders.pop() {
+        for entry in fs::read_dir(folder).into_iter().flatten().flatten() {
+            if entry.file_type().is_ok_and(|t| t.is_dir()) {
+                folders.push(entry.path());
+            } else if is_unfinished(&entry.file_name().to_string_lossy()) {
+                return Some(entry.path());
+            }
+        }
+    }
+    None
+}
+
 #[derive(Default)]
 struct Set {
     run: Xxh3Default,
@@ -338,6 +353,7 @@ mod tests {
         }
         fs::write(job.join("c.obj.part"), "").unwrap();
         assert!(look().unfinished);
+        assert_eq!(unfinished(&job), Some(job.join("c.obj.part")));
     }
 
     #[test]

@@ -20,6 +20,8 @@ const REST: Duration = Duration::from_secs(5);
 const UNSEEN_MAX: Duration = Duration::from_secs(30);
 /// A scan looks at jobs for so long, the others' turn comes with the next, at once; what can be begun is begun between the two.
 const LOOKS: Duration = SCAN_EVERY[0];
+/// When a job has rested so many times longer and is still held back, it is said by what.
+const TOLD_RESTS: u32 = 5;
 /// A followed sequence without `.done` is whole when it has rested so many times longer than other jobs.
 const FOLLOWED_RESTS: u32 = 30;
 /// So many times with `--once`, which nobody wants to wait for: as long as a frame without a final newline.
@@ -237,7 +239,8 @@ impl Daemon<'_> {
             }
         }
         let is_rendering = self.current.contains(&id);
-        let Some(settling) = &entry.settling else { return };
+        let Some(settling) = &mut entry.settling else { return };
+        let is_to_be_told = settling.is_to_be_told(TOLD_RESTS * settle, now);
         if let Some(whole) = settling.settles(span).filter(|at| *at > now) {
             entry.due = entry.due.min(whole);
         }
@@ -250,6 +253,22 @@ impl Daemon<'_> {
                 session.asked = Some(seen.run);
                 self.see_whether_it_fits(id);
             }
+        }
+        if is_to_be_told {
+            self.say_why(id);
+        }
+    }
+
+    /// Says what a job waits for that has rested for long.
+    fn say_why(&mut self, id: u64) {
+        let Some(entry) = self.entries.get(&id) else { return };
+        let path = self.options.inbox.join(&entry.found.file);
+        if let Some(file) = inbox::unfinished(&path) {
+            let file = file.strip_prefix(&path).unwrap_or(&file).display();
+            self.note(&format!(
+                "{}: waits for {file}, which is still being written by its name; rename or remove it, or put .done there",
+                path.display()
+            ));
         }
     }
 
