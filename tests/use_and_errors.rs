@@ -154,6 +154,15 @@ fn compare_says_what_differs_and_what_it_cannot_tell() {
     for (folder, format) in [("a", "jp2"), ("b", "jp2"), ("a", "ras")] {
         render(t, &input, folder, &["--size", "32x18", "--format", format], 0);
     }
+    for flip in ["nan", "-0.1", "2", "x"] {
+        assert_eq!(run(t, ["compare", t.to_str().unwrap(), t.to_str().unwrap(), "--flip", flip]).status, 2);
+    }
+    for empty in [t.join("empty/a"), t.join("empty/b")] {
+        std::fs::create_dir_all(&empty).unwrap();
+        std::fs::write(empty.join("notes.txt"), "").unwrap();
+    }
+    let told = run(t, ["compare".as_ref(), t.join("empty/a").as_os_str(), t.join("empty/b").as_os_str()]);
+    assert!(told.status == 2 && told.stderr.contains("no pictures"), "{}", told.stderr);
     // the same bytes are equal whatever they are
     let told = said(1, "2 pictures compared, 0 differ, 2 are in one folder only");
     assert!(told.contains("wave_0001.ras: is only in "), "{told}");

@@ -17,8 +17,17 @@ pub(super) struct CompareArgs {
     /// What to compare it with
     b: PathBuf,
     /// Allow a mean FLIP up to this
-    #[arg(long, value_name = "X")]
+    #[arg(long, value_name = "X", value_parser = share)]
     flip: Option<f64>,
+}
+
+fn share(text: &str) -> Result<f64, String> {
+    let share = text.parse().map_err(|_| "no number".to_string())?;
+    if (0.0..=1.0).contains(&share) {
+        Ok(share)
+    } else {
+        Err("out of range: allowed from 0 to 1".to_string())
+    }
 }
 
 /// Compares and tells of each picture.

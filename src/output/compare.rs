@@ -61,6 +61,9 @@ fn compare_files(a: &Path, b: &Path) -> Result<PictureOutcome, OutputError> {
 
 fn compare_folders(a: &Path, b: &Path) -> Result<Vec<PictureComparison>, OutputError> {
     let (in_a, in_b) = (pictures_below(a)?, pictures_below(b)?);
+    if in_a.is_empty() && in_b.is_empty() {
+        return Err(OutputError::NoPictures(a.to_path_buf(), b.to_path_buf()));
+    }
     let compared = in_a.union(&in_b).map(|picture| {
         let outcome = match (in_a.contains(picture), in_b.contains(picture)) {
             (true, false) => PictureOutcome::Alone(a.to_path_buf()),
@@ -164,6 +167,8 @@ mod tests {
     #[test]
     fn what_cannot_be_compared_at_all_is_an_error() {
         let folder = tempfile::tempdir().unwrap();
+        let told = compare_paths(folder.path(), folder.path()).unwrap_err().to_string();
+        assert!(told.contains("no pictures"), "{told}");
         ppm(folder.path(), "a.ppm", &[[1, 2, 3]]);
         let file = folder.path().join("a.ppm");
         assert_eq!(compare_paths(&file, &file).unwrap()[0].picture, Path::new("a.ppm"));

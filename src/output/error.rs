@@ -48,6 +48,9 @@ pub enum OutputError {
         /// What the decoder says.
         why: String,
     },
+    /// There is nothing to compare.
+    #[error("{} and {}: no pictures are in either; name two folders of pictures", .0.display(), .1.display())]
+    NoPictures(PathBuf, PathBuf),
     /// A folder and a file are to be compared.
     #[error("{} and {}: one is a folder, the other is not; name two pictures or two folders", .0.display(), .1.display())]
     FolderAndFile(PathBuf, PathBuf),
