@@ -157,3 +157,18 @@ fn cache_tells_and_clears() {
     told("clear");
     assert!(t.join("store/mine.txt").exists());
 }
+
+/// Not even root removes what the system shows of a process.
+#[test]
+#[cfg(target_os = "linux")]
+fn cache_counts_only_what_it_removed() {
+    let t = tempfile::tempdir().unwrap();
+    let store = t.path().join("store");
+    std::fs::create_dir(&store).unwrap();
+    std::os::unix::fs::symlink("/proc/self", store.join("v1")).unwrap();
+    let told = run(t.path(), ["cache", "clear", "--json"]);
+    let line: serde_json::Value = serde_json::from_str(&told.stdout).unwrap();
+    assert_eq!(line["removed"], serde_json::json!({"entries": 0, "bytes": 0}));
+    assert!(line["entries"].as_u64().unwrap() > 0, "{line}");
+    assert!(told.status == 1 && told.stderr.contains("cannot be removed"), "{}", told.stderr);
+}

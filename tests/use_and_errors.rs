@@ -165,6 +165,82 @@ fn render_farms_read_progress() {
     assert!(told.ends_with("openjd_fail: 1 frames failed\n"), "{told}");
 }
 
+#[test]
+fn compare_says_what_differs_and_what_it_cannot_tell() {
+    let t = tempfile::tempdir().unwrap();
+    let t = t.path();
+    let input = wave(&t.join("w"), 2, 4, 7);
+    let said = |status: i32, wanted: &str| {
+        let run = run(t, ["compare".as_ref(), t.join("a").as_os_str(), t.join("b").as_os_str()]);
+        assert!(run.status == status && run.stderr.contains(wanted), "{}{}", run.stdout, run.stderr);
+        run.stdout
+    };
+    for (folder, format) in [("a", "jp2"), ("b", "jp2"), ("a", "ras")] {
+        render(t, &input, folder, &["--size", "32x18", "--format", format], 0);
+    }
+    for flip in ["nan", "-0.1", "2", "x"] {
+        assert_eq!(run(t, ["compare", t.to_str().unwrap(), t.to_str().unwrap(), "--flip", flip]).status, 2);
+    }
+    for empty in [t.join("empty/a"), t.join("empty/b")] {
+        std::fs::create_dir_all(&empty).unwrap();
+        std::fs::write(empty.join("notes.txt"), "").unwrap();
+    }
+    let told = run(t, ["compare".as_ref(), t.join("empty/a").as_os_str(), t.join("empty/b").as_os_str()]);
+    assert!(told.status == 2 && told.stderr.contains("no pictures"), "{}", told.stderr);
+    // the same bytes are equal whatever they are
+    let told = said(1, "2 pictures compared, 0 differ, 2 are in one folder only");
+    assert!(told.contains("wave_0001.ras: is only in "), "{told}");
+    render(t, &input, "b", &["--size", "32x18", "--format", "ras"], 0);
+    said(0, "4 pictures compared, 0 differ\n");
+    let picture = t.join("b/wave_0002.ras");
+    let mut bytes = std::fs::read(&picture).unwrap();
+    bytes[99] ^= 0xff;
+    std::fs::write(&picture, bytes).unwrap();
+    let told = said(1, "4 pictures compared, 1 differ\n");
+    assert!(told.contains("wave_0002.ras: max "), "{told}");
+    std::fs::write(t.join("b/wave_0001.jp2"), "torn").unwrap();
+    let told = said(2, "3 pictures compared, 1 differ, 1 cannot be read\n");
+    assert!(told.contains("a/wave_0001.jp2: is not a picture that can be compared"), "{told}");
+}
+
+/// A pipe into which nobody writes is not waited for, and a device without end not read.
+#[test]
+#[cfg(unix)]
+fn what_is_no_plain_file_is_refused() {
+    let t = tempfile::tempdir().unwrap();
+    let t = t.path();
+    let path = |name: &str| t.join(name).to_str().unwrap().to_owned();
+    let fifo = |name: &str| {
+        let made = std::process::Command::new("mkfifo").arg(t.join(name)).status().unwrap();
+        assert!(made.success());
+        path(name)
+    };
+    let (job, picture, endless) = (fifo("job.yaml"), fifo("a.png"), path("endless.png"));
+    std::os::unix::fs::symlink("/dev/zero", &endless).unwrap();
+    let input = wave(&t.join("w"), 1, 4, 7);
+    let obj = input.join("wave_0001.obj").to_str().unwrap().to_owned();
+    for args in [
+        vec!["render", &job],
+        vec!["render", &obj, "--job", &job],
+        vec!["compare", &picture, &picture],
+        vec!["compare", &obj, &endless],
+        vec!["render", &obj, "--background", &picture, "-o", &path("out")],
+    ] {
+        let mut child = common::rentix(t).args(&args).stderr(std::process::Stdio::piped()).spawn().unwrap();
+        let since = std::time::Instant::now();
+        while child.try_wait().unwrap().is_none() {
+            if since.elapsed().as_secs() > 60 {
+                child.kill().unwrap();
+                panic!("{args:?} hangs");
+            }
+            std::thread::sleep(std::time::Duration::from_millis(20));
+        }
+        let ended = child.wait_with_output().unwrap();
+        let said = String::from_utf8_lossy(&ended.stderr);
+        assert!(ended.status.code() != Some(0) && said.contains("plain file"), "{args:?}: {said}");
+    }
+}
+
 /// Nine panes of refracting glass, each entered and none left.
 #[test]
 fn media_that_are_too_deep_are_told_of() {

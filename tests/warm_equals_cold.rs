@@ -87,6 +87,48 @@ fn nan_in_one_frame() {
     assert!(told.status == 0 && told.stderr.contains("1 failed in every way alike"), "{}", told.stderr);
 }
 
+/// Where every frame fails there is nothing to compare, which is no success; each file that warns counts once, not in each
+/// way; what only one run has is refused.
+#[test]
+fn verify_says_what_it_cannot_do() {
+    let t = tempfile::tempdir().unwrap();
+    let t = t.path();
+    let folder = t.join("w");
+    std::fs::create_dir(&folder).unwrap();
+    for frame in 1..=5 {
+        let text = format!("mtllib gone.mtl\n{}", moved(frame, |t, [x, y, z]| [x, y + t, z]));
+        std::fs::write(folder.join(format!("f_{frame}.obj")), text).unwrap();
+    }
+    let input = folder.to_str().unwrap();
+    let verify = |more: &[&str]| run(t, [&["verify", input, "--size", "32x18"], more].concat());
+    let told = verify(&[]);
+    assert!(told.status == 0 && told.stderr.contains("the same for 2 more files"), "{}", told.stderr);
+    let report = t.join("r.json");
+    for (more, named) in [
+        (&["--report", report.to_str().unwrap()][..], "--report"),
+        (&["-o", "out"], "-o"),
+        (&["--dry-run"], "--dry-run"),
+        (&["--cold"], "--cold"),
+        (&["--order", "reverse"], "--order"),
+        (&["--overwrite"], "--overwrite"),
+        (&["--movie", "a.mp4"], "--movie"),
+    ] {
+        let told = verify(more);
+        assert!(told.status == 2 && told.stderr.contains(named), "{}", told.stderr);
+    }
+    assert!(!report.exists());
+    let told = verify(&["--device", "cpu", "--device-memory", "1"]);
+    assert!(told.status == 3 && told.stderr.contains("nothing to compare"), "{}", told.stderr);
+    for frame in 1..=5 {
+        std::fs::write(folder.join(format!("f_{frame}.obj")), "f 1 2 3\n").unwrap();
+    }
+    let told = verify(&["-q"]);
+    assert!(told.status == 2 && told.stderr.contains("f_1.obj:1: "), "{}", told.stderr);
+    assert!(!told.stderr.contains("cannot be read"), "{}", told.stderr);
+    let told = verify(&["--json"]);
+    assert!(told.status == 2 && told.stdout.contains("\"verdict\":\"nothing\""), "{}", told.stdout);
+}
+
 /// What equals the frame before is copied, also where its file's names differ.
 #[test]
 fn equal_frames_are_copied() {

@@ -57,6 +57,32 @@ fn a_folder_and_archives_give_what_render_gives() {
 }
 
 #[test]
+fn a_picture_that_is_gone_is_rendered_again() {
+    let w = Watched::new();
+    let folder = w.job("walk", 3);
+    w.job("other", 1);
+    let want = w.wanted(&folder, &[]);
+    w.once(&[], 0);
+    for listing in [true, false] {
+        fs::remove_file(w.path("done/walk/wave_0002.png")).unwrap();
+        if !listing {
+            // of an earlier version, which kept none
+            fs::remove_file(w.path("done/walk/.rentix/pictures")).unwrap();
+        }
+        let said = w.once(&["--json"], 0).stdout;
+        assert!(said.contains("it is rendered again"), "{said}");
+        assert_eq!(said.matches("\"status\":\"rendered\"").count(), 1, "{said}");
+        assert!(!said.contains("\"job\":\"other\""), "{said}");
+        assert_same(&want, &w.done("walk"), "again");
+        assert_eq!(w.status("walk")["frames"], serde_json::json!({"done": 3, "failed": 0, "all": 3}));
+    }
+    // what else lies there, or is not there, is no reason
+    fs::write(w.path("done/walk/film.png"), "").unwrap();
+    let said = w.once(&["--json"], 0).stdout;
+    assert!(!said.contains("\"state\""), "{said}");
+}
+
+#[test]
 fn what_changed_is_a_new_run_of_the_same_job() {
     let w = Watched::new();
     let folder = w.job("walk", 2);
@@ -195,6 +221,53 @@ fn one_bad_frame_fails_its_job_and_the_others_stay() {
     let mut lines: Vec<String> = fs::read_to_string(told).unwrap().lines().map(str::to_owned).collect();
     lines.sort();
     assert_eq!(lines, ["good finished 0", "walk failed 1"]);
+}
+
+#[test]
+fn it_is_said_what_a_job_waits_for() {
+    use std::io::{BufRead, BufReader};
+    let w = Watched::new();
+    let part = w.job("walk", 1).join("wave_0002.obj.part");
+    fs::write(&part, "v 0").unwrap();
+    let mut command = common::rentix(w.t.path());
+    let mut daemon = command.args(w.args(&[])).stderr(std::process::Stdio::piped()).spawn().unwrap();
+    let mut said = String::new();
+    for line in BufReader::new(daemon.stderr.take().unwrap()).lines().map_while(Result::ok) {
+        if line.contains("waits for wave_0002.obj.part") {
+            fs::remove_file(&part).unwrap();
+        }
+        said += &line;
+    }
+    assert_eq!(said.matches("waits for").count(), 1, "{said}");
+    assert!(daemon.wait().unwrap().success() && w.status("walk")["state"] == "finished", "{said}");
+}
+
+#[test]
+fn errors_of_archives_name_files_as_they_were_packed() {
+    let w = Watched::new();
+    let folder = w.path("walk");
+    wave(&folder, 2, 6, 8);
+    fs::write(folder.join("wave_0001.obj"), "v 0 0 0\nv 1 0 0\nf 1 2 3\n").unwrap();
+    let good = folder.join("wave_0002.obj");
+    fs::write(&good, "mtllib gone.mtl\n".to_owned() + &fs::read_to_string(&good).unwrap()).unwrap();
+    zip_of(&folder, &w.path("inbox/frame.zip"));
+    tar_of(&folder, &w.path("inbox/inner.tar"));
+    fs::write(folder.join("job.yaml"), "sequence: gone\n").unwrap();
+    zip_of(&folder, &w.path("inbox/job.zip"));
+    fs::write(folder.join("job.yaml"), "sequense: .\n").unwrap();
+    zip_of(&folder, &w.path("inbox/typo.zip"));
+    let told = w.once(&[], 1).stderr;
+    for (job, begins) in [
+        ("frame", "frame.zip: wave_0001.obj:3: "),
+        ("inner", "inner.tar: inner/wave_0001.obj:3: "),
+        ("job", "job.zip: gone"),
+        ("typo", "typo.zip: job.yaml:1:1: "),
+    ] {
+        let error = w.status(job)["error"].as_str().unwrap().to_owned();
+        assert!(error.starts_with(begins), "{error}");
+    }
+    assert!(told.contains("warning: frame.zip: ") && told.contains("gone.mtl"), "{told}");
+    assert!(!told.contains("unpacked"), "{told}");
 }
 
 #[test]
@@ -357,7 +430,10 @@ fn a_running_daemon_sees_what_changes_and_what_is_cancelled() {
     fs::rename(&long, w.path("inbox/long")).unwrap();
     until("long", &|| is("long", "running", 0));
     fs::write(w.path("inbox/long.cancel"), "").unwrap();
+    let since = std::time::Instant::now();
     until("cancelled", &|| is("long", "cancelled", 0));
+    // it is told of, and not found by the next look at what rests, after 5 s
+    assert!(since.elapsed().as_secs() < 3, "{:?}", since.elapsed());
     w.job("short", 1);
     until("short", &|| is("short", "finished", 1));
     let kill = std::process::Command::new("kill").arg("-TERM").arg(child.id().to_string()).status().unwrap();

@@ -1,7 +1,7 @@
 //! `rentix cache`.
 
-use super::{Global, store::store};
-use crate::store::Stat;
+use super::{EXIT_FAILED, Global, store::store};
+use crate::store::{Removed, Stat};
 use anyhow::{Result, bail};
 use clap::{Args, ValueEnum};
 use std::path::PathBuf;
@@ -33,7 +33,7 @@ pub(super) fn cache(args: &CacheArgs, global: &Global) -> Result<ExitCode> {
         bail!("there is no place for a store; --cache or RENTIX_CACHE names one");
     };
     let removed = match args.what {
-        What::Stat => Stat::default(),
+        What::Stat => Removed::default(),
         What::Gc => store.collect_garbage(),
         What::Clear => store.clear(),
     };
@@ -42,14 +42,16 @@ pub(super) fn cache(args: &CacheArgs, global: &Global) -> Result<ExitCode> {
     if global.json {
         let line = serde_json::json!({
             "folder": root.to_string(), "entries": entries, "bytes": bytes, "limit_bytes": limit_bytes,
-            "removed": removed,
+            "removed": removed.gone,
         });
         out!("{line}");
     } else {
         if !matches!(args.what, What::Stat) {
-            out!("{} entries removed, {} bytes", removed.entries, removed.bytes);
+            out!("{} entries removed, {} bytes", removed.gone.entries, removed.gone.bytes);
         }
         out!("{root}: {entries} entries, {bytes} bytes of {limit_bytes}");
     }
-    Ok(ExitCode::SUCCESS)
+    let Some(why) = &removed.why else { return Ok(ExitCode::SUCCESS) };
+    err!("error: {why}; {} files or folders stay (look who may write there)", removed.failed);
+    Ok(ExitCode::from(EXIT_FAILED))
 }

@@ -93,7 +93,8 @@ enum Command {
     Watch(Box<watch::WatchArgs>),
     /// Renders warm and cold and in several orders, and compares byte for byte
     #[command(
-        after_help = "Example: rentix verify walk/ --size 160x90 --update refit\n\nExit status: 0 equal, 1 they differ; the first frame and pixel that differ are named."
+        mut_args(|a| if verify::NOT_TAKEN.contains(&a.get_id().as_str()) { a.hide(true) } else { a }),
+        after_help = "Example: rentix verify walk/ --size 160x90 --update refit\n\nExit status: 0 equal, 1 they differ, the first frame and pixel that do are named; 2 nothing could be compared."
     )]
     Verify(Box<render_args::RenderArgs>),
     /// Tells what is in a sequence, what changes from frame to frame and what it will cost; renders nothing

@@ -41,11 +41,16 @@ pub struct Comparison {
     pub max: f64,
     /// Root of the mean square of all differences, 0 to 1.
     pub rmse: f64,
-    /// −20 · log10(rmse) in dB; None where the pictures are equal.
+    /// −20 · log10(rmse) in dB, 0 or more; None where the pictures are equal.
     pub psnr: Option<f64>,
     /// Mean LDR-FLIP of the colour, 0 to 1, seen from 0.7 m on a screen 0.7 m wide with 3840 columns; 0 where the
     /// pictures have no colour.
     pub flip: f64,
+}
+
+impl Comparison {
+    /// That of equal pictures.
+    pub const EQUAL: Self = Self { max: 0.0, rmse: 0.0, psnr: None, flip: 0.0 };
 }
 
 /// Why two pictures cannot be compared value by value.
@@ -87,7 +92,9 @@ pub fn compare(a: &Picture, b: &Picture) -> Result<Comparison, Mismatch> {
     }
     let rmse = if sums.count == 0 { 0.0 } else { (sums.squares / sums.count as f64).sqrt() };
     let flip = if sums.max == 0.0 { 0.0 } else { color_flip(a, b) };
-    Ok(Comparison { max: sums.max, rmse, psnr: (rmse > 0.0).then(|| -20.0 * rmse.log10()), flip })
+    // of black against white 0, not −0
+    let psnr = (rmse > 0.0).then(|| 0.0 - 20.0 * rmse.log10());
+    Ok(Comparison { max: sums.max, rmse, psnr, flip })
 }
 
 fn color_flip(a: &Picture, b: &Picture) -> f64 {
@@ -213,6 +220,10 @@ mod tests {
         assert_eq!(c.max, 0.25);
         assert!((c.rmse - 0.102_062).abs() < 1e-6 && (c.psnr.unwrap() - 19.823).abs() < 1e-3, "{c:?}");
         assert!(c.flip > 0.0 && c.flip < 1.0);
+        let [black, white] =
+            [0.0, 1.0].map(|v: f32| picture(&[("R", &[v; 2]), ("G", &[v; 2]), ("B", &[v; 2])]));
+        let psnr = compare(&black, &white).unwrap().psnr.unwrap();
+        assert!(psnr == 0.0 && psnr.is_sign_positive());
     }
 
     #[test]

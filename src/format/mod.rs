@@ -30,6 +30,7 @@ pub use library::Library;
 pub use mtl::{mtl_word_accepts, mtl_word_takes, mtl_words};
 pub use obj::{Parsed, ParsedObj, parse_obj};
 use text::Text;
+pub use text::open_plain;
 pub use texture::{TextureCache, load_picture};
 
 /// How files are read.

@@ -130,15 +130,26 @@ fn unreadable(path: &Path, cause: io::Error) -> FormatError {
 
 /// Opens a plain file that is not too long; its length, which may grow.
 fn open(path: &Path) -> Result<(io::Take<File>, u64), FormatError> {
-    let metadata = fs::metadata(path).map_err(|source| unreadable(path, source))?;
-    // a pipe or a device could keep us waiting, or never end
-    if !metadata.is_file() {
+    let opened = open_plain(path).map_err(|source| unreadable(path, source))?;
+    let Some((file, length)) = opened else {
         return Err(FormatError::NotAFile { path: path.to_path_buf() });
-    }
-    within_limit(path, metadata.len())?;
-    let file = File::open(path).map_err(|source| unreadable(path, source))?;
+    };
+    within_limit(path, length)?;
     // a byte more than the limit tells a file that has grown beyond it
-    Ok((file.take(MAX_FILE_BYTES + 1), metadata.len()))
+    Ok((file.take(MAX_FILE_BYTES + 1), length))
+}
+
+/// Opens a plain file, or a link to one, and gives its length; None where it is something else: a pipe or a device could
+/// keep us waiting, or never end.
+///
+/// # Errors
+/// Where it is not there or may not be read.
+pub fn open_plain(path: &Path) -> io::Result<Option<(File, u64)>> {
+    let metadata = fs::metadata(path)?;
+    if !metadata.is_file() {
+        return Ok(None);
+    }
+    Ok(Some((File::open(path)?, metadata.len())))
 }
 
 fn within_limit(path: &Path, bytes: u64) -> Result<(), FormatError> {

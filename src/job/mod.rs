@@ -185,6 +185,9 @@ pub enum JobError {
         /// What the system said.
         cause: io::Error,
     },
+    /// A pipe or a device stands where a file should.
+    #[error("{}: is not a plain file; name a job file", .0.display())]
+    NotAFile(PathBuf),
     /// Two files for one frame.
     #[error("frame {number} is given twice: {} and {}; {remedy}", first.display(), second.display())]
     TwoOfANumber {

@@ -2,7 +2,7 @@
 
 use super::encoding::Format;
 use super::error::OutputError;
-use super::read::read_picture;
+use super::read::{decode, read_bytes};
 use crate::film::compare::{Comparison, compare};
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -21,18 +21,26 @@ pub struct PictureComparison {
 pub enum PictureOutcome {
     /// Value by value.
     Compared(Comparison),
-    /// Not at all, and why: it is missing on one side, has another size or other channels, or is broken.
+    /// As another one by its size or channels: how.
     Incomparable(String),
+    /// It is in one folder only: in which.
+    Alone(PathBuf),
+    /// One of the two cannot be read: why.
+    Unreadable(String),
 }
 
 /// Compares two pictures, or the pictures of two folders and their subfolders by name (hidden ones left out), in the
-/// order of names. An error where the two cannot be read at all; what is wrong with a picture of a folder is its outcome.
+/// order of names. Files that are the same byte for byte are equal, whether they can be read as pictures or not.
+///
+/// # Errors
+/// Where the two cannot be read at all, or are folders without pictures; what is wrong with a picture of a folder is its
+/// outcome.
 pub fn compare_paths(a: &Path, b: &Path) -> Result<Vec<PictureComparison>, OutputError> {
     let is_folder = |path: &Path| path.metadata().map(|m| m.is_dir()).map_err(OutputError::read(path));
     match (is_folder(a)?, is_folder(b)?) {
         (true, true) => compare_folders(a, b),
         (false, false) => {
-            let outcome = PictureOutcome::Compared(compare_files(a, b)?);
+            let outcome = compare_files(a, b)?;
             let picture = a.file_name().map_or_else(|| a.to_path_buf(), PathBuf::from);
             Ok(vec![PictureComparison { picture, outcome }])
         }
@@ -40,22 +48,28 @@ pub fn compare_paths(a: &Path, b: &Path) -> Result<Vec<PictureComparison>, Outpu
     }
 }
 
-fn compare_files(a: &Path, b: &Path) -> Result<Comparison, OutputError> {
-    Ok(compare(&read_picture(a)?, &read_picture(b)?)?)
+fn compare_files(a: &Path, b: &Path) -> Result<PictureOutcome, OutputError> {
+    let [in_a, in_b] = [read_bytes(a)?, read_bytes(b)?];
+    if in_a == in_b {
+        return Ok(PictureOutcome::Compared(Comparison::EQUAL));
+    }
+    Ok(match compare(&decode(&in_a, a)?, &decode(&in_b, b)?) {
+        Ok(comparison) => PictureOutcome::Compared(comparison),
+        Err(mismatch) => PictureOutcome::Incomparable(mismatch.to_string()),
+    })
 }
 
 fn compare_folders(a: &Path, b: &Path) -> Result<Vec<PictureComparison>, OutputError> {
     let (in_a, in_b) = (pictures_below(a)?, pictures_below(b)?);
+    if in_a.is_empty() && in_b.is_empty() {
+        return Err(OutputError::NoPictures(a.to_path_buf(), b.to_path_buf()));
+    }
     let compared = in_a.union(&in_b).map(|picture| {
-        let outcome = if !in_b.contains(picture) {
-            PictureOutcome::Incomparable(format!("is only in {}", a.display()))
-        } else if !in_a.contains(picture) {
-            PictureOutcome::Incomparable(format!("is only in {}", b.display()))
-        } else {
-            match compare_files(&a.join(picture), &b.join(picture)) {
-                Ok(comparison) => PictureOutcome::Compared(comparison),
-                Err(error) => PictureOutcome::Incomparable(error.to_string()),
-            }
+        let outcome = match (in_a.contains(picture), in_b.contains(picture)) {
+            (true, false) => PictureOutcome::Alone(a.to_path_buf()),
+            (false, _) => PictureOutcome::Alone(b.to_path_buf()),
+            (true, true) => compare_files(&a.join(picture), &b.join(picture))
+                .unwrap_or_else(|error| PictureOutcome::Unreadable(error.to_string())),
         };
         PictureComparison { picture: picture.clone(), outcome }
     });
@@ -132,21 +146,29 @@ mod tests {
         let told = |i: usize| match &compared[i].outcome {
             PictureOutcome::Compared(c) => format!("{:.4} {}", c.max, c.psnr.is_none()),
             PictureOutcome::Incomparable(why) => why.clone(),
+            PictureOutcome::Alone(folder) => format!("only in {}", folder.display()),
+            PictureOutcome::Unreadable(why) => format!("unreadable: {why}"),
         };
         // 51 / 255 = 0.2
         assert_eq!(
             (told(0).as_str(), told(2).as_str(), told(5).as_str()),
             ("0.2000 false", "0.0000 true", "0.0000 true")
         );
-        assert_eq!(told(1), format!("is only in {}", b.path().display()));
-        assert_eq!(told(4), format!("is only in {}", a.path().display()));
+        assert_eq!(told(1), format!("only in {}", b.path().display()));
+        assert_eq!(told(4), format!("only in {}", a.path().display()));
         assert_eq!(told(3), "the sizes differ: 1x1 and 2x1");
-        assert!(told(6).contains("torn.png"), "{}", told(6));
+        assert!(told(6).starts_with("unreadable: ") && told(6).contains("torn.png"), "{}", told(6));
+        // what cannot be read is equal to itself
+        std::fs::copy(a.path().join("torn.png"), b.path().join("torn.png")).unwrap();
+        let compared = compare_paths(a.path(), b.path()).unwrap();
+        assert_eq!(compared[6].outcome, PictureOutcome::Compared(Comparison::EQUAL));
     }
 
     #[test]
     fn what_cannot_be_compared_at_all_is_an_error() {
         let folder = tempfile::tempdir().unwrap();
+        let told = compare_paths(folder.path(), folder.path()).unwrap_err().to_string();
+        assert!(told.contains("no pictures"), "{told}");
         ppm(folder.path(), "a.ppm", &[[1, 2, 3]]);
         let file = folder.path().join("a.ppm");
         assert_eq!(compare_paths(&file, &file).unwrap()[0].picture, Path::new("a.ppm"));
@@ -156,5 +178,8 @@ mod tests {
         let text = folder.path().join("text.png");
         std::fs::write(&text, "this is no picture").unwrap();
         assert!(error(&file, &text).contains("text.png: is not a picture"));
+        ppm(folder.path(), "b.ppm", &[[1, 2, 3], [1, 2, 3]]);
+        let outcome = &compare_paths(&file, &folder.path().join("b.ppm")).unwrap()[0].outcome;
+        assert_eq!(outcome, &PictureOutcome::Incomparable("the sizes differ: 1x1 and 2x1".to_string()));
     }
 }

@@ -1,6 +1,5 @@
 //! What can go wrong with pictures and records.
 
-use crate::film::compare::Mismatch;
 use std::io;
 use std::path::{Path, PathBuf};
 
@@ -42,19 +41,19 @@ pub enum OutputError {
         why: String,
     },
     /// A file is not a picture that can be read.
-    #[error("{}: is not a picture that can be compared: {why}; all formats but jp2 and sr are read", path.display())]
+    #[error("{}: is not a picture that can be compared: {why}; all formats but jp2 are read", path.display())]
     Decode {
         /// Which.
         path: PathBuf,
         /// What the decoder says.
         why: String,
     },
+    /// There is nothing to compare.
+    #[error("{} and {}: no pictures are in either; name two folders of pictures", .0.display(), .1.display())]
+    NoPictures(PathBuf, PathBuf),
     /// A folder and a file are to be compared.
     #[error("{} and {}: one is a folder, the other is not; name two pictures or two folders", .0.display(), .1.display())]
     FolderAndFile(PathBuf, PathBuf),
-    /// Two pictures cannot be compared value by value.
-    #[error(transparent)]
-    Mismatch(#[from] Mismatch),
 }
 
 impl OutputError {

@@ -1,6 +1,6 @@
 //! Files that tell by a mark in them that this program made them.
 
-use std::fs::File;
+use crate::format::open_plain;
 use std::io::{Read, Seek, SeekFrom};
 use std::path::Path;
 
@@ -9,8 +9,7 @@ const LOOK_BYTES: u64 = 1 << 20;
 
 /// Whether a mark stands near a file's beginning or end; in what cannot be read none does.
 pub fn has_mark(path: &Path, mark: &str) -> bool {
-    let Ok(mut file) = File::open(path) else { return false };
-    let length = file.metadata().map_or(0, |m| m.len());
+    let Ok(Some((mut file, length))) = open_plain(path) else { return false };
     [0, length.saturating_sub(LOOK_BYTES)].into_iter().any(|from| {
         let mut part = Vec::new();
         file.seek(SeekFrom::Start(from)).is_ok()

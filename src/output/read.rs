@@ -1,13 +1,13 @@
-//! Pictures read back from files, to be compared: all formats that are written but JPEG 2000 and Sun raster, known by
-//! their first bytes.
+//! Pictures read back from files, to be compared: all formats that are written but JPEG 2000, known by their first bytes.
 
 use super::encoding::Format;
 use super::error::OutputError;
+use super::sun;
 use crate::film::compare::{Channel, Picture, Samples};
+use crate::format::open_plain;
 use exr::meta::header::Header;
 use exr::prelude::{FlatSamples, MetaData, ReadChannels, ReadLayers, read};
 use image::{DynamicImage, ImageFormat, ImageReader, Limits};
-use std::fs::File;
 use std::io::{Cursor, Read};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
@@ -22,23 +22,42 @@ const EXR_MAGIC: [u8; 4] = [0x76, 0x2f, 0x31, 0x01];
 
 /// Reads a picture. A broken file is an error, also where a decoder panics on it.
 pub fn read_picture(path: &Path) -> Result<Picture, OutputError> {
-    let bytes = read_bytes(path)?;
-    let decode =
-        || if bytes.starts_with(&EXR_MAGIC) { decode_exr(&bytes) } else { decode_image(&bytes, path) };
+    decode(&read_bytes(path)?, path)
+}
+
+/// The picture that a file's bytes are.
+pub(super) fn decode(bytes: &[u8], path: &Path) -> Result<Picture, OutputError> {
+    let decode = || {
+        if bytes.starts_with(&EXR_MAGIC) {
+            decode_exr(bytes)
+        } else if sun::is_sun(bytes) {
+            decode_sun(bytes)
+        } else {
+            decode_image(bytes, path)
+        }
+    };
     catch_unwind(AssertUnwindSafe(decode))
         .unwrap_or_else(|_| Err("the decoder failed on it".into()))
         .map_err(|why| OutputError::Decode { path: path.to_path_buf(), why })
 }
 
-fn read_bytes(path: &Path) -> Result<Vec<u8>, OutputError> {
+pub(super) fn read_bytes(path: &Path) -> Result<Vec<u8>, OutputError> {
+    let Some((file, _)) = open_plain(path).map_err(OutputError::read(path))? else {
+        return Err(OutputError::Decode { path: path.to_path_buf(), why: "it is no plain file".into() });
+    };
     let mut bytes = Vec::new();
-    let mut file = File::open(path).map_err(OutputError::read(path))?.take(PICTURE_BYTES_MAX + 1);
-    file.read_to_end(&mut bytes).map_err(OutputError::read(path))?;
+    file.take(PICTURE_BYTES_MAX + 1).read_to_end(&mut bytes).map_err(OutputError::read(path))?;
     if bytes.len() as u64 > PICTURE_BYTES_MAX {
         let why = format!("it holds more than {PICTURE_BYTES_MAX} bytes");
         return Err(OutputError::Decode { path: path.to_path_buf(), why });
     }
     Ok(bytes)
+}
+
+fn decode_sun(bytes: &[u8]) -> Result<Picture, String> {
+    let (size, codes) = sun::decode(bytes, SIDE_MAX)?;
+    let shares: Vec<u16> = codes.iter().map(|&code| 257 * u16::from(code)).collect();
+    Ok(Picture { size, channels: channels(&RGBA[..3], &shares, Samples::Share) })
 }
 
 fn decode_image(bytes: &[u8], path: &Path) -> Result<Picture, String> {

@@ -111,7 +111,7 @@ fn input_files(job: &Job) -> HashSet<PathBuf> {
 }
 
 /// The files of a picture, relative to the output folder.
-pub(super) fn files_of(picture: &Picture) -> Vec<PathBuf> {
+pub fn files_of(picture: &Picture) -> Vec<PathBuf> {
     let s = &picture.settings;
     file_names(&picture.picture, encoding(s).format, s.aovs)
 }

@@ -24,6 +24,7 @@ mod under_way;
 pub mod verify;
 mod write;
 
+pub use check::files_of;
 pub use event::{Event, FrameReport, Status};
 pub use fleet::Fleet;
 pub use forecast::{Forecast, forecast};

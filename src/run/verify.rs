@@ -5,6 +5,7 @@ use crate::device::Stop;
 use crate::job::{Job, Order};
 use crate::output;
 use crate::scene::Aov;
+use std::fs;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -37,6 +38,8 @@ pub enum Verdict {
         /// What differs.
         what: String,
     },
+    /// There is nothing to compare: every frame failed in every way.
+    Nothing,
     /// It was stopped.
     Stopped,
 }
@@ -55,7 +58,10 @@ pub fn verify<E: From<RunError>>(
 ) -> Result<(Verdict, Outcome), E> {
     let room = tempfile::tempdir().map_err(RunError::NoRoom)?;
     let mut run = |way: Way| -> Result<Outcome, E> {
-        let job = job_of(job, way, &room.path().join(way.name));
+        let folder = room.path().join(way.name);
+        // a run whose frames all fail makes none
+        fs::create_dir(&folder).map_err(RunError::NoRoom)?;
+        let job = job_of(job, way, &folder);
         let options = RunOptions { cold: way.cold, report: None, overwrite: false, ..options.clone() };
         Ok(render(&job, &options, &fleet()?, stop, &mut |event| on_event(&way, event))?)
     };
@@ -72,7 +78,9 @@ pub fn verify<E: From<RunError>>(
             return Ok((Verdict::Differs { way: way.name, what }, first));
         }
     }
-    Ok((Verdict::Equal, first))
+    let failed = first.failed().count();
+    let verdict = if failed > 0 && failed == job.pictures.len() { Verdict::Nothing } else { Verdict::Equal };
+    Ok((verdict, first))
 }
 
 /// The job that renders to a folder in the order of a way, ids with every picture.

@@ -1,7 +1,8 @@
 //! The files of a store: how many, and which to give up.
 
 use crate::clock::{EARLIEST, FileTime, file_time};
-use std::fs::{self, Metadata};
+use std::fs::{self, DirEntry, Metadata};
+use std::io;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
@@ -28,6 +29,35 @@ impl Stat {
     }
 }
 
+/// What was removed, and what could not be.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Removed {
+    /// Entries that are gone.
+    pub gone: Stat,
+    /// How many files could not be removed, and folders not looked into.
+    pub failed: u64,
+    /// Why, of the first of them.
+    pub why: Option<String>,
+}
+
+impl Removed {
+    fn fail(&mut self, what: &str, path: &Path, error: &io::Error) {
+        self.failed += 1;
+        self.why.get_or_insert_with(|| format!("{}: cannot be {what}: {error}", path.display()));
+    }
+
+    /// Removes a file; whether it was this that did so.
+    fn remove(&mut self, path: &Path) -> bool {
+        let removed = fs::remove_file(path);
+        if let Err(error) = &removed
+            && error.kind() != io::ErrorKind::NotFound
+        {
+            self.fail("removed", path, error);
+        }
+        removed.is_ok()
+    }
+}
+
 struct Found {
     path: PathBuf,
     bytes: u64,
@@ -37,28 +67,37 @@ struct Found {
 
 pub(super) fn stat(root: &Path) -> Stat {
     let mut stat = Stat::default();
-    files(root).iter().filter(|f| !f.is_unfinished).for_each(|f| stat.add(f.bytes));
+    let files = files(root, &mut Removed::default());
+    files.iter().filter(|f| !f.is_unfinished).for_each(|f| stat.add(f.bytes));
     stat
 }
 
 /// Removes abandoned files and, the longest unused first, entries until so many bytes are left.
-pub(super) fn shrink(root: &Path, limit_bytes: u64) -> Stat {
+pub(super) fn shrink(root: &Path, limit_bytes: u64) -> Removed {
     let now = file_time();
+    let mut removed = Removed::default();
     let (unfinished, mut entries): (Vec<Found>, Vec<Found>) =
-        files(root).into_iter().partition(|f| f.is_unfinished);
-    let is_abandoned =
-        |f: &&Found| limit_bytes == 0 || now.duration_since(f.used).is_ok_and(|age| age > ABANDONED);
-    unfinished.iter().filter(is_abandoned).for_each(|f| remove(&f.path));
+        files(root, &mut removed).into_iter().partition(|f| f.is_unfinished);
+    for file in unfinished {
+        if limit_bytes == 0 || now.duration_since(file.used).is_ok_and(|age| age > ABANDONED) {
+            removed.remove(&file.path);
+        }
+    }
     entries.sort_by(|a, b| (a.used, &a.path).cmp(&(b.used, &b.path)));
     let mut left: u64 = entries.iter().map(|f| f.bytes).sum();
-    let mut removed = Stat::default();
     for entry in entries {
-        if left <= limit_bytes {
+        // with 0, what was cut to nothing goes, too
+        if limit_bytes > 0 && left <= limit_bytes {
             break;
         }
-        left -= entry.bytes;
-        removed.add(entry.bytes);
-        remove(&entry.path);
+        let failed = removed.failed;
+        if removed.remove(&entry.path) {
+            removed.gone.add(entry.bytes);
+        }
+        if removed.failed == failed {
+            // another process may have done so
+            left -= entry.bytes;
+        }
     }
     removed
 }
@@ -75,14 +114,15 @@ pub(super) fn remove(path: &Path) {
 }
 
 /// All files below the version's folder: kinds, first digits, entries. Nothing else is looked at.
-fn files(root: &Path) -> Vec<Found> {
-    let entries = |folder: PathBuf| fs::read_dir(folder).into_iter().flatten().flatten();
-    let subfolders = |folder: PathBuf| entries(folder).filter(|e| e.file_type().is_ok_and(|t| t.is_dir()));
+fn files(root: &Path, failed: &mut Removed) -> Vec<Found> {
+    let mut folders = vec![root.join(VERSION)];
+    for _ in 0..2 {
+        let below = folders.iter().flat_map(|folder| entries(folder, failed));
+        let below = below.filter(|e| e.file_type().is_ok_and(|t| t.is_dir()));
+        folders = below.map(|e| e.path()).collect();
+    }
     let mut found = Vec::new();
-    for file in subfolders(root.join(VERSION))
-        .flat_map(|kind| subfolders(kind.path()))
-        .flat_map(|first| entries(first.path()))
-    {
+    for file in folders.iter().flat_map(|folder| entries(folder, failed)) {
         let Some(metadata) = file.metadata().ok().filter(Metadata::is_file) else { continue };
         found.push(Found {
             is_unfinished: file.file_name().to_string_lossy().starts_with(UNFINISHED),
@@ -92,4 +132,16 @@ fn files(root: &Path) -> Vec<Found> {
         });
     }
     found
+}
+
+fn entries(folder: &Path, failed: &mut Removed) -> Vec<DirEntry> {
+    match fs::read_dir(folder) {
+        Ok(entries) => entries.flatten().collect(),
+        Err(error) => {
+            if error.kind() != io::ErrorKind::NotFound {
+                failed.fail("read", folder, &error);
+            }
+            Vec::new()
+        }
+    }
 }

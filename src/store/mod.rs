@@ -9,7 +9,7 @@ mod entry;
 mod folder;
 mod payload;
 
-pub use folder::{Stat, is_own_checkout};
+pub use folder::{Removed, Stat, is_own_checkout};
 pub use payload::Payload;
 
 use entry::{Entry, Kind};
@@ -95,12 +95,12 @@ impl Store {
 
     /// Removes what was not used for longest until it is within its limit, and what dead processes left; gives what was
     /// removed.
-    pub fn collect_garbage(&self) -> Stat {
+    pub fn collect_garbage(&self) -> Removed {
         folder::shrink(&self.root, self.limit_bytes)
     }
 
     /// Removes everything; gives what was removed.
-    pub fn clear(&self) -> Stat {
+    pub fn clear(&self) -> Removed {
         folder::shrink(&self.root, 0)
     }
 

@@ -98,9 +98,9 @@ fn the_longest_unused_goes_first() {
     }
     // the first is used again
     assert!(got(&store, "a", Key(1)).is_some());
-    assert_eq!(store.collect_garbage(), Stat { entries: 1, bytes: 66 });
+    assert_eq!(store.collect_garbage().gone, Stat { entries: 1, bytes: 66 });
     assert_eq!([1, 2, 3].map(|key| got(&store, "a", Key(key)).is_some()), [true, false, true]);
-    assert_eq!(store.clear().entries, 2);
+    assert_eq!(store.clear().gone.entries, 2);
     assert_eq!(store.stat().entries, 0);
 }
 

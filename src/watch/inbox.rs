@@ -71,6 +71,21 @@ pub(super) struct Inbox {
     pub(super) others: Vec<OsString>,
 }
 
+/// Of a name that says something of a job beside it, as `NAME.cancel`, that of the job's file, or of what that is without
+/// the end of an archive.
+pub(super) fn said_of(name: &OsStr) -> Option<&OsStr> {
+    let name = Path::new(name);
+    let says = name.extension().is_some_and(|e| e == "done" || e == "cancel");
+    name.file_stem().filter(|_| says)
+}
+
+/// The name of a job's file, and that without the end of an archive where it has one: what stands before `.done` and
+/// `.cancel` beside it.
+pub(super) fn names(file: &OsStr) -> impl Iterator<Item = &OsStr> {
+    let stem = file.to_str().and_then(packed).map(|(_, stem)| OsStr::new(stem));
+    [Some(file), stem].into_iter().flatten()
+}
+
 /// Lists the inbox.
 pub(super) fn list(inbox: &Path) -> Result<Inbox, WatchError> {
     let mut found = Inbox::default();
@@ -78,8 +93,7 @@ pub(super) fn list(inbox: &Path) -> Result<Inbox, WatchError> {
         let entry = entry.map_err(cannot("read", inbox))?;
         let file = entry.file_name();
         let text = file.to_string_lossy().into_owned();
-        let says = Path::new(&text).extension().is_some_and(|e| e == "done" || e == "cancel");
-        if text.starts_with('.') || says || is_unfinished(&text) {
+        if text.starts_with('.') || said_of(&file).is_some() || is_unfinished(&text) {
             continue;
         }
         let kind = entry.file_type().map_err(cannot("read", &entry.path()))?;
@@ -125,10 +139,11 @@ pub(super) fn look(inbox: &Path, found: &Found) -> io::Result<Seen> {
     }
     let (run, exact) = (set.run.digest128(), set.exact.digest128());
     let beside = |end: &str| {
-        let mut whole = found.file.clone();
-        whole.push(end);
-        let stem = found.file.to_str().and_then(packed).map(|(_, stem)| format!("{stem}{end}"));
-        inbox.join(whole).exists() || stem.is_some_and(|stem| inbox.join(stem).exists())
+        names(&found.file).any(|name| {
+            let mut name = name.to_os_string();
+            name.push(end);
+            inbox.join(name).exists()
+        })
     };
     let inside = |name: &str| found.kind == Kind::Folder && path.join(name).exists();
     Ok(Seen {
@@ -139,6 +154,21 @@ pub(super) fn look(inbox: &Path, found: &Found) -> io::Result<Seen> {
         done: inside(".done") || beside(".done"),
         cancelled: inside(".cancel") || beside(".cancel"),
     })
+}
+
+/// A file of a job whose name says that it is still being written.
+pub(super) fn unfinished(job: &Path) -> Option<PathBuf> {
+    let mut folders = vec![job.to_path_buf()];
+    while let Some(folder) = folders.pop() {
+        for entry in fs::read_dir(folder).into_iter().flatten().flatten() {
+            if entry.file_type().is_ok_and(|t| t.is_dir()) {
+                folders.push(entry.path());
+            } else if is_unfinished(&entry.file_name().to_string_lossy()) {
+                return Some(entry.path());
+            }
+        }
+    }
+    None
 }
 
 #[derive(Default)]
@@ -323,6 +353,7 @@ mod tests {
         }
         fs::write(job.join("c.obj.part"), "").unwrap();
         assert!(look().unfinished);
+        assert_eq!(unfinished(&job), Some(job.join("c.obj.part")));
     }
 
     #[test]
@@ -348,6 +379,18 @@ mod tests {
         fs::write(t.path().join("w.tar.gz.cancel"), "").unwrap();
         let seen = look(t.path(), &found).unwrap();
         assert!(seen.done && seen.cancelled && seen.files == 1);
+    }
+
+    #[test]
+    fn a_name_says_something_of_the_job_beside_it() {
+        for (name, job) in
+            [("w.cancel", Some("w")), ("w.TAR.gz.done", Some("w.TAR.gz")), ("w.zip", None), (".cancel", None)]
+        {
+            assert_eq!(said_of(OsStr::new(name)), job.map(OsStr::new), "{name}");
+        }
+        for (file, wanted) in [("w.v2", &["w.v2"][..]), ("w.TAR.gz", &["w.TAR.gz", "w"])] {
+            assert!(names(OsStr::new(file)).eq(wanted.iter().map(OsStr::new)), "{file}");
+        }
     }
 
     #[test]

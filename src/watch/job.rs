@@ -7,7 +7,7 @@ use crate::job::{self, Job, JobError, Request};
 use std::ffi::OsStr;
 use std::fs;
 use std::io;
-use std::path::{Path, PathBuf};
+use std::path::{MAIN_SEPARATOR, Path, PathBuf};
 
 /// Names of the job file.
 const JOB_FILES: [&str; 2] = ["job.yaml", "job.yml"];
@@ -26,8 +26,8 @@ pub(super) enum Unfit {
     Job(#[from] JobError),
     #[error(transparent)]
     Frame(#[from] FormatError),
-    #[error("{}: is a link; put the job file itself there", .0.display())]
-    Link(PathBuf),
+    #[error("{}: is no plain file; put the job file itself there", .0.display())]
+    NotAFile(PathBuf),
     #[error("{}: cannot be used: {source}; look whether it is still there and may be read", path.display())]
     Unusable { path: PathBuf, source: io::Error },
 }
@@ -46,6 +46,23 @@ pub(super) struct Place {
     pub(super) room: PathBuf,
     /// Where its pictures go.
     pub(super) out: PathBuf,
+}
+
+impl Place {
+    /// A text about files that were unpacked, as whoever packed them knows them: `walk.zip: a.obj:2: …`.
+    pub(super) fn as_packed(&self, text: &str) -> String {
+        if self.kind == Kind::Folder {
+            return text.to_owned();
+        }
+        let archive = self.source.file_name().unwrap_or_default().to_string_lossy();
+        let real = self.room.canonicalize().unwrap_or_else(|_| self.room.clone());
+        let mut text = text.to_owned();
+        for room in [real, self.room.clone()].map(|room| room.display().to_string()) {
+            text = text.replace(&format!("{room}{MAIN_SEPARATOR}"), &format!("{archive}: "));
+            text = text.replace(&room, &archive);
+        }
+        text
+    }
 }
 
 /// The priority that a job asks for, if it does; an archive is looked through for it, and refused where it is bad.
@@ -102,7 +119,7 @@ fn job_file(root: &Path) -> Result<Option<PathBuf>, Unfit> {
     for path in JOB_FILES.map(|name| root.join(name)) {
         match fs::symlink_metadata(&path) {
             Ok(meta) if meta.is_file() => return Ok(Some(path)),
-            Ok(_) => return Err(Unfit::Link(path)),
+            Ok(_) => return Err(Unfit::NotAFile(path)),
             Err(error) if error.kind() == io::ErrorKind::NotFound => {}
             Err(error) => return Err(unusable(&path)(error)),
         }

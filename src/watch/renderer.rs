@@ -6,10 +6,12 @@ use super::follow_run;
 use super::job::{self, Place, Unfit};
 use crate::device::Stop;
 use crate::job::{Job, Request};
+use crate::output;
 use crate::run::{self, DeviceReport, Event, Fleet, Outcome, RunOptions};
 use std::collections::HashSet;
 use std::ffi::OsString;
 use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::path::PathBuf;
 use std::sync::mpsc::{Sender, channel};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::JoinHandle;
@@ -96,13 +98,22 @@ impl Drop for Renderer {
 fn one(order: &Order, options: &RunOptions, fleet: &Fleet, messages: &Sender<Message>) -> Told {
     let mut tell = |event: &Event| {
         // nobody listens any more once the daemon ends
-        let _ = messages.send(Message::Told(order.id, Told::Event(Box::new(event.clone()))));
+        let event = as_packed(event.clone(), &order.place);
+        let _ = messages.send(Message::Told(order.id, Told::Event(Box::new(event))));
     };
     let rendered = catch_unwind(AssertUnwindSafe(|| {
-        let job = prepared(order).map_err(|unfit| not_prepared(&unfit))?;
+        let job = prepared(order).map_err(|unfit| not_prepared(&unfit, &order.place))?;
         let priority = order.priority.clamp(i32::MIN.into(), i32::MAX.into()) as i32;
         let options = RunOptions { priority, ..options.clone() };
-        run::render(&job, &options, fleet, &order.stop, &mut tell).map_err(|e| Told::Unfit(e.to_string()))
+        let unfit = |error: String| Told::Unfit(order.place.as_packed(&error));
+        let outcome = run::render(&job, &options, fleet, &order.stop, &mut tell)
+            .map_err(|error| unfit(error.to_string()))?;
+        if order.only.is_none() && !outcome.stopped && outcome.failed().next().is_none() {
+            // a later daemon tells by it whether they are there still
+            let files = job.pictures.iter().flat_map(run::files_of);
+            output::keep_listing(&job.folder, files).map_err(|error| unfit(error.to_string()))?;
+        }
+        Ok(outcome)
     }));
     match rendered {
         Ok(Ok(outcome)) => Told::Ended(Box::new(outcome)),
@@ -112,11 +123,27 @@ fn one(order: &Order, options: &RunOptions, fleet: &Fleet, messages: &Sender<Mes
 }
 
 /// What is told where nothing can be rendered.
-fn not_prepared(unfit: &Unfit) -> Told {
+fn not_prepared(unfit: &Unfit, place: &Place) -> Told {
     match unfit {
         Unfit::Archive(error) if error.is_full_disk() => Told::Full(unfit.to_string()),
-        _ => Told::Unfit(unfit.to_string()),
+        // it names the archive, or where on this machine it could not be unpacked
+        Unfit::Archive(_) => Told::Unfit(unfit.to_string()),
+        _ => Told::Unfit(place.as_packed(&unfit.to_string())),
     }
+}
+
+/// An event with the names of files as they were packed.
+fn as_packed(mut event: Event, place: &Place) -> Event {
+    match &mut event {
+        Event::Start { .. } => {}
+        Event::Frame(frame) => frame.error = frame.error.take().map(|error| place.as_packed(&error)),
+        Event::Warning(warning) => {
+            warning.text = place.as_packed(&warning.text);
+            let file = warning.file.as_ref().map(|file| place.as_packed(&file.display().to_string()));
+            warning.file = file.map(PathBuf::from);
+        }
+    }
+    event
 }
 
 fn prepared(order: &Order) -> Result<Job, Unfit> {
@@ -133,6 +160,7 @@ fn prepared(order: &Order) -> Result<Job, Unfit> {
 #[cfg(test)]
 mod tests {
     use super::super::archive::ArchiveError;
+    use super::super::inbox::Kind;
     use super::*;
     use std::io;
 
@@ -140,7 +168,9 @@ mod tests {
     fn a_full_disk_is_no_fault_of_an_archive() {
         let write = |kind: io::ErrorKind| {
             let source = kind.into();
-            not_prepared(&Unfit::Archive(ArchiveError::Write { path: "a_1.obj".into(), source }))
+            let place =
+                Place { source: "a.zip".into(), kind: Kind::Folder, room: "a".into(), out: "out".into() };
+            not_prepared(&Unfit::Archive(ArchiveError::Write { path: "a_1.obj".into(), source }), &place)
         };
         assert!(matches!(write(io::ErrorKind::StorageFull), Told::Full(why) if why.contains("a_1.obj")));
         assert!(matches!(write(io::ErrorKind::PermissionDenied), Told::Unfit(_)));

@@ -24,19 +24,21 @@ pub(super) struct Seen {
 pub(super) struct Settling {
     seen: Seen,
     since: Duration,
+    /// Whether it was asked for since then what it waits for.
+    is_told: bool,
 }
 
 impl Settling {
     /// Begins with what is seen now.
     pub(super) fn new(seen: Seen, now: Duration) -> Self {
-        Self { seen, since: now }
+        Self { seen, since: now, is_told: false }
     }
 
     /// Takes what is seen now; whether it is another set of files than before.
     pub(super) fn see(&mut self, seen: Seen, now: Duration) -> bool {
         let is_other = seen.exact != self.seen.exact || seen.files != self.seen.files;
         if is_other {
-            self.since = now;
+            *self = Self::new(seen, now);
         }
         self.seen = seen;
         is_other
@@ -50,6 +52,15 @@ impl Settling {
     /// When the set will have been equal over the whole span, if nothing in it changes.
     pub(super) fn settles(&self, span: Duration) -> Option<Duration> {
         (self.seen.files > 0 && !self.seen.unfinished).then(|| self.since + span)
+    }
+
+    /// Whether it is to be told what is waited for: once, where the set was seen equal over the whole span and a name in it
+    /// holds it back.
+    pub(super) fn is_to_be_told(&mut self, span: Duration, now: Duration) -> bool {
+        let is_held_back = self.seen.unfinished && !self.seen.done;
+        let is_due = is_held_back && now.saturating_sub(self.since) >= span && !self.is_told;
+        self.is_told |= is_due;
+        is_due
     }
 
     /// Whether the set was seen equal over the whole span, or its owner says that it is whole. Nothing is not yet a job.
@@ -97,8 +108,10 @@ mod tests {
     fn what_is_unfinished_is_waited_for_and_done_starts_at_once() {
         let mut s = Settling::new(Seen { unfinished: true, ..set(1) }, at(0.0));
         assert!(!s.is_settled(SPAN, at(1e6)));
+        assert!(!s.is_to_be_told(SPAN, at(1.9)) && s.is_to_be_told(SPAN, at(2.0)));
+        assert!(!s.is_to_be_told(SPAN, at(9.0)), "once");
         s.see(Seen { unfinished: true, done: true, ..set(1) }, at(1e6));
-        assert!(s.is_settled(SPAN, at(1e6)));
+        assert!(s.is_settled(SPAN, at(1e6)) && !s.is_to_be_told(SPAN, at(1e6)));
         let s = Settling::new(Seen { done: true, ..set(1) }, at(0.0));
         assert!(s.is_settled(SPAN, at(0.0)));
         let empty = Settling::new(Seen { files: 0, ..set(1) }, at(0.0));

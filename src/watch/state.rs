@@ -128,6 +128,11 @@ impl Status {
         self.state.is_end() && self.run == run
     }
 
+    /// What is gone of the pictures in a job's folder that this says are there, in words.
+    pub(super) fn gone(&self, folder: &Path) -> Option<String> {
+        (self.state == State::Finished).then(|| output::gone(folder, self.frames.done))?
+    }
+
     /// Reads the status in a job's folder of pictures; None where there is none that can be understood.
     pub fn read(folder: &Path) -> Option<Self> {
         let mut bytes = Vec::new();

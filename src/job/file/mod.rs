@@ -12,7 +12,7 @@ use super::settings::{self, FILTERS, MTL_COLORS};
 use super::template;
 use super::track::Placed;
 use super::words::one_of;
-use crate::format::ClipChoice;
+use crate::format::{self, ClipChoice};
 use crate::scene::AovSet;
 use fields::{Fields, Read, color, frames, integer, list, number, parsed, text, truth, unexpected, whole};
 use node::{Node, Value, Wrong, place_of};
@@ -100,7 +100,8 @@ pub(super) fn read(path: &Path) -> Result<JobFile, JobError> {
     let unreadable = |cause| JobError::Unreadable { path: path.to_path_buf(), cause };
     let wrong = |place: String, text: String| JobError::File { path: path.to_path_buf(), place, text };
     let mut bytes = Vec::new();
-    let file = std::fs::File::open(path).map_err(unreadable)?;
+    let opened = format::open_plain(path).map_err(unreadable)?;
+    let (file, _) = opened.ok_or_else(|| JobError::NotAFile(path.to_path_buf()))?;
     file.take(MAX_BYTES + 1).read_to_end(&mut bytes).map_err(unreadable)?;
     if bytes.len() as u64 > MAX_BYTES {
         return Err(wrong(String::new(), format!("is longer than the {MAX_BYTES} bytes of any job file")));

@@ -63,7 +63,8 @@ impl Term<'_> {
     fn name(self) -> String {
         match self {
             Self::Encode(format) => format!("encode {format}"),
-            Self::Write(format) => format!("write {format}"),
+            // as `write` it was kept for each pixel, however few
+            Self::Write(format) => format!("file {format}"),
             Self::Trace { is_deep: true } => "trace deep".to_string(),
             Self::Trace { is_deep: false } => "trace".to_string(),
             other => format!("{other:?}").to_lowercase(),
@@ -82,7 +83,9 @@ impl Term<'_> {
             Self::Parse => (2e-9, 65536.0),
             Self::Restore => (0.2e-9, 65536.0),
             Self::Pose => (30e-9, 256.0),
-            Self::Encode(_) | Self::Write(_) => (8e-9, 4096.0),
+            Self::Encode(_) => (8e-9, 4096.0),
+            // the record and the picture are flushed, for which the size of a file hardly matters: 4 ms
+            Self::Write(_) => (1e-9, 4e6),
             Self::Upload if is_gpu => (0.1e-9, 1e6),
             // a reference, however much it refers to
             Self::Upload => (5e-18, 1e12),
@@ -209,6 +212,18 @@ mod tests {
         let host = Estimates::new(Speeds::Host, b"");
         assert_eq!(host.expected(Term::Read, 10.0), host.expected(Term::Read, 0.0));
         assert!(host.expected(Term::Read, 10.0).value > 0.0);
+    }
+
+    #[test]
+    fn small_pictures_say_what_large_ones_take_to_write() {
+        let mut host = Estimates::new(Speeds::Host, b"");
+        let (tiny, hd, uhd) = (64.0 * 36.0, 1280.0 * 720.0, 3840.0 * 2160.0);
+        host.learn(Term::Write("png"), tiny, 5e-3);
+        let host = Estimates::new(Speeds::Host, &host.kept(b""));
+        let expected = |pixels| host.expected(Term::Write("png"), pixels).value;
+        assert!(near(expected(tiny), 5e-3) && near(expected(hd), 5e-3), "{}", expected(hd));
+        // 8.3 million pixels of which 4 million are the least
+        assert!(near(expected(uhd), 5e-3 * uhd / 4e6));
     }
 
     #[test]

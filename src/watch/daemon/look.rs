@@ -6,7 +6,7 @@ use crate::watch::inbox::{self, Found, Kind};
 use crate::watch::settle::{Seen, Settling};
 use crate::watch::state::{State, Status, now_ms};
 use std::collections::HashSet;
-use std::ffi::OsString;
+use std::ffi::{OsStr, OsString};
 use std::io;
 use std::path::Path;
 use std::time::Duration;
@@ -20,6 +20,8 @@ const REST: Duration = Duration::from_secs(5);
 const UNSEEN_MAX: Duration = Duration::from_secs(30);
 /// A scan looks at jobs for so long, the others' turn comes with the next, at once; what can be begun is begun between the two.
 const LOOKS: Duration = SCAN_EVERY[0];
+/// When a job has rested so many times longer and is still held back, it is said by what.
+const TOLD_RESTS: u32 = 5;
 /// A followed sequence without `.done` is whole when it has rested so many times longer than other jobs.
 const FOLLOWED_RESTS: u32 = 30;
 /// So many times with `--once`, which nobody wants to wait for: as long as a frame without a final newline.
@@ -57,8 +59,15 @@ impl Daemon<'_> {
             self.meet(found);
         }
         let now = self.now();
-        for name in self.hints.take() {
-            if let Some(entry) = self.by_file.get(&name).and_then(|id| self.entries.get_mut(id)) {
+        let hints = self.hints.take();
+        let mut hinted: Vec<u64> = hints.iter().filter_map(|name| self.by_file.get(name)).copied().collect();
+        let beside: HashSet<&OsStr> = hints.iter().filter_map(|name| inbox::said_of(name)).collect();
+        if !beside.is_empty() {
+            let is_meant = |file: &OsStr| inbox::names(file).any(|name| beside.contains(name));
+            hinted.extend(self.by_file.iter().filter(|(file, _)| is_meant(file)).map(|(_, id)| *id));
+        }
+        for id in hinted {
+            if let Some(entry) = self.entries.get_mut(&id) {
                 entry.due = entry.due.min(now.max(entry.rests));
             }
         }
@@ -230,7 +239,8 @@ impl Daemon<'_> {
             }
         }
         let is_rendering = self.current.contains(&id);
-        let Some(settling) = &entry.settling else { return };
+        let Some(settling) = &mut entry.settling else { return };
+        let is_to_be_told = settling.is_to_be_told(TOLD_RESTS * settle, now);
         if let Some(whole) = settling.settles(span).filter(|at| *at > now) {
             entry.due = entry.due.min(whole);
         }
@@ -243,6 +253,22 @@ impl Daemon<'_> {
                 session.asked = Some(seen.run);
                 self.see_whether_it_fits(id);
             }
+        }
+        if is_to_be_told {
+            self.say_why(id);
+        }
+    }
+
+    /// Says what a job waits for that has rested for long.
+    fn say_why(&mut self, id: u64) {
+        let Some(entry) = self.entries.get(&id) else { return };
+        let path = self.options.inbox.join(&entry.found.file);
+        if let Some(file) = inbox::unfinished(&path) {
+            let file = file.strip_prefix(&path).unwrap_or(&file).display();
+            self.note(&format!(
+                "{}: waits for {file}, which is still being written by its name; rename or remove it, or put .done there",
+                path.display()
+            ));
         }
     }
 
@@ -322,12 +348,16 @@ impl Daemon<'_> {
 
     /// Goes on with what an earlier daemon, or another one, wrote.
     fn go_on(&mut self, id: u64, known: Status, seen: &Seen) -> bool {
-        let run = run_word(seen);
+        let has_ended = known.ended(&run_word(seen));
+        let gone = if has_ended { known.gone(&self.options.out.join(&known.job)) } else { None };
         let Some(entry) = self.entries.get_mut(&id) else { return false };
         entry.named = true;
-        let has_ended = known.ended(&run);
         entry.status = known;
-        if has_ended {
+        if let Some(gone) = gone {
+            entry.status.run.clear();
+            entry.enter(State::Received, None);
+            self.note(&format!("{gone}; it is rendered again"));
+        } else if has_ended {
             entry.phase = Phase::Ended;
         }
         true

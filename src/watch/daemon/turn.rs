@@ -142,9 +142,10 @@ impl Daemon<'_> {
     /// Whether another daemon has ended this very run meanwhile; then its word stands.
     pub(super) fn adopt(&mut self, id: u64) -> bool {
         let Some(entry) = self.entries.get(&id) else { return false };
-        let known = Status::read(&self.out(entry));
+        let folder = self.out(entry);
+        let known = Status::read(&folder).filter(|known| entry.is_ended_by(known));
+        let Some(ended) = known.filter(|known| known.gone(&folder).is_none()) else { return false };
         let Some(entry) = self.entries.get_mut(&id) else { return false };
-        let Some(ended) = known.filter(|known| entry.is_ended_by(known)) else { return false };
         entry.status = ended;
         entry.phase = Phase::Ended;
         entry.hush();
