@@ -376,7 +376,8 @@ fn signals_end_the_daemon_and_its_jobs_go_on_later() {
     for (signal, status) in [("-INT", 130), ("-TERM", 143)] {
         let w = Watched::new();
         wave(&w.path("inbox/walk"), 12, 16, 24);
-        let mut args = w.args(&["--samples", "64"]);
+        // all frames together take much longer than the daemon takes to hear of the signal
+        let mut args = w.args(&["--samples", "512"]);
         args.retain(|a| a != "--once");
         let mut child =
             common::rentix(w.t.path()).args(args).stderr(std::process::Stdio::null()).spawn().unwrap();
@@ -388,7 +389,7 @@ fn signals_end_the_daemon_and_its_jobs_go_on_later() {
         let there = w.done("walk").len();
         assert!((1..12).contains(&there), "{there}");
         assert_eq!(w.status("walk")["state"], "queued");
-        let events = w.once(&["--samples", "64", "--json"], 0).stdout;
+        let events = w.once(&["--samples", "512", "--json"], 0).stdout;
         assert_eq!(events.matches("\"status\":\"resumed\"").count(), there);
         assert_eq!(w.done("walk").len(), 12);
     }

@@ -190,7 +190,9 @@ pub fn render(
     {
         return Err(RunError::ReportPlace { file: file.clone(), why });
     }
-    check::can_be_written(job, &records, options)?;
+    if !stop.asked() {
+        check::can_be_written(job, &records, options)?;
+    }
     let mut saved = report::Saver::new(options.report.clone());
     let mut report = Report::new(fleet.reports(), options.keeps_reports || options.report.is_some());
     saved.save(&mut report, &since, true)?;
