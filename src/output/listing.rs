@@ -1,9 +1,8 @@
-//! Which files a whole run left in an output folder: `DIR/.rentix/pictures`, replaced whole. Records do not say it, for they
+//! Which files a whole run left in an output folder: `DIR/.rentix/pictures`. Records do not say it, for they
 //! name what earlier runs made, too.
 //!
 //! A line a file, relative to the folder, as records write names.
 
-use super::atomic::write_atomic;
 use super::compare::pictures_below;
 use super::error::OutputError;
 use super::record_name::{name_from_path, path_from_name};
@@ -20,7 +19,9 @@ pub fn keep_listing(folder: &Path, files: impl IntoIterator<Item = PathBuf>) -> 
     let folder = records_folder(folder);
     fs::create_dir_all(&folder).map_err(OutputError::write(&folder))?;
     let lines: String = files.into_iter().map(|file| name_from_path(&file) + "\n").collect();
-    write_atomic(&folder.join(LISTING), lines.as_bytes())
+    let file = folder.join(LISTING);
+    // neither flushed nor in one step: what a kill or a power cut leaves of it lets a job be looked through once more
+    fs::write(&file, lines).map_err(OutputError::write(&file))
 }
 
 /// What is gone of the files that a run left in an output folder, in words; None where all are there. No file is read, and
