@@ -32,7 +32,7 @@ fn wrong_use_ends_in_2_and_writes_nothing() {
     refused(&input, &["--frames", "2-1"], "`2-1` ends before it begins; write 1-2");
     std::fs::write(t.join("file"), "kept").unwrap();
     let said = render(t, &input, "file", &[], 2).stderr;
-    assert!(said.contains("file"), "{said}");
+    assert!(said.contains("file: is no folder") && said.contains("-o"), "{said}");
     assert_eq!(std::fs::read(t.join("file")).unwrap(), b"kept");
 }
 
@@ -233,7 +233,7 @@ fn what_is_no_plain_file_is_refused() {
                 child.kill().unwrap();
                 panic!("{args:?} hangs");
             }
-            std::thread::sleep(std::time::Duration::from_millis(20));
+            std::thread::yield_now();
         }
         let ended = child.wait_with_output().unwrap();
         let said = String::from_utf8_lossy(&ended.stderr);
@@ -329,5 +329,21 @@ fn the_report_has_frames_in_the_order_in_which_they_were_taken() {
         let loads: Vec<bool> = frames.map(|f| f["update"]["action"] == "load").collect();
         assert!(loads.iter().skip(1).all(|load| !load), "{device}: {loads:?}");
         assert!(loads.first().is_none_or(|&load| load), "{device}: {loads:?}");
+    }
+}
+
+/// What is so large or small that no ray meets it is not left out in silence.
+#[test]
+fn scenes_beyond_what_rays_meet_are_warned_of() {
+    let t = tempfile::tempdir().unwrap();
+    let t = t.path();
+    let obj = t.join("a.obj");
+    for (size, is_met) in [("1e13", false), ("1e12", true), ("1e-15", true), ("1e-16", false)] {
+        std::fs::write(&obj, format!("v -{size} -{size} 0\nv {size} -{size} 0\nv 0 {size} 0\nf 1 2 3\n"))
+            .unwrap();
+        let said = render(t, &obj, "out", &["--size", "16x16", "--overwrite"], 0).stderr;
+        assert_eq!(said.contains("wide; rays meet"), !is_met, "{size}: {said}");
+        let picture = image::open(t.join("out/a.png")).unwrap().to_rgb8();
+        assert_eq!(picture.pixels().any(|p| p.0 != [0; 3]), is_met, "{size}");
     }
 }

@@ -182,38 +182,6 @@ fn cancelled_jobs_are_not_rendered_until_they_are_wanted_again() {
 }
 
 #[test]
-fn jobs_of_higher_priority_come_first_and_then_the_oldest() {
-    let w = Watched::new();
-    let ordered = |name: &str, text: &str| {
-        fs::write(w.job(name, 1).join("job.yaml"), format!("sequence: .\n{text}\n")).unwrap();
-    };
-    // as many as are rendered at a time keep the others waiting, and end when they are told to
-    let long: Vec<String> = (0..16).map(|n| format!("a{n:02}")).collect();
-    for name in &long {
-        ordered(name, "samples: 65536");
-    }
-    let mut command = common::rentix(w.t.path());
-    command.args(w.args(&["--quiet", "--priority", "3", "--device", "cpu"]));
-    let mut daemon = command.spawn().unwrap();
-    let is = |job: &str, state: &str| {
-        let status = fs::read_to_string(w.path("done").join(job).join("status.json")).unwrap_or_default();
-        serde_json::from_str::<Value>(&status).is_ok_and(|status| status["state"] == state)
-    };
-    until("long jobs run", || long.iter().all(|job| is(job, "running")));
-    ordered("b", "priority: -1");
-    ordered("c", "priority: 0");
-    w.job("d", 1);
-    ordered("e", "priority: 7");
-    until("others wait", || ["b", "c", "d", "e"].iter().all(|job| is(job, "queued")));
-    for name in &long {
-        fs::write(w.path("inbox").join(name).join(".cancel"), "").unwrap();
-    }
-    daemon.wait().unwrap();
-    let begun = ["e", "d", "c", "b"].map(|job| w.status(job)["times"]["started_ms"].as_u64());
-    assert!(begun.is_sorted() && begun[0].is_some(), "{begun:?}");
-}
-
-#[test]
 fn one_bad_frame_fails_its_job_and_the_others_stay() {
     let w = Watched::new();
     let folder = w.job("walk", 3);

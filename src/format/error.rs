@@ -16,7 +16,7 @@ pub enum FormatError {
         cause: io::Error,
     },
     /// A folder, a pipe or a device stands where a file should.
-    #[error("{}: is not a plain file; name an OBJ file", path.display())]
+    #[error("{}: is not a plain file, but a folder, a pipe or a device; name a file", path.display())]
     NotAFile {
         /// What was named.
         path: PathBuf,

@@ -18,6 +18,9 @@ const STORED: &str = "boxes-2";
 /// Below so many bytes files are scanned in less than a millisecond.
 const LEAST_STORED_BYTES: u64 = 1 << 20;
 
+/// Products of three lengths are numbers of 32 bits when a ray is tested against a triangle.
+const WIDTHS: [f64; 2] = [1e-15, 2e12];
+
 /// The box of a sequence's layers over the frames that are looked at. What cannot be read is left out and said.
 pub(super) fn bounds(
     sequence: &Sequence,
@@ -49,6 +52,14 @@ pub(super) fn bounds(
                 warnings.add(None, None, format!("{error}; it is left out of the auto camera's box"));
             }
         }
+    }
+    let width = (all.max - all.min).max_element();
+    if width > WIDTHS[1] || width > 0.0 && width < WIDTHS[0] {
+        let text = format!(
+            "{} is {width:.1e} wide; rays meet what is {:.0e} to {:.0e} wide: scale it (transform of a layer in a job file)",
+            sequence.name, WIDTHS[0], WIDTHS[1]
+        );
+        warnings.add(None, None, text);
     }
     all
 }

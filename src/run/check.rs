@@ -44,16 +44,14 @@ pub(super) fn can_be_written(job: &Job, records: &Records, options: &RunOptions)
     Ok(output::make_writable(&job.folder)?)
 }
 
-/// Refuses pictures of which one would take the place of another's auxiliary ones.
+/// Refuses auxiliary pictures that would take the place of others; pictures were found to differ when the job was read.
 pub(super) fn each_has_its_place(job: &Job) -> Result<(), RunError> {
-    let mut places = HashSet::new();
-    for picture in job.pictures.iter().filter(|p| !p.settings.aovs.is_empty()) {
-        places.extend(files_of(picture));
+    if job.pictures.iter().all(|picture| picture.settings.aovs.is_empty()) {
+        return Ok(());
     }
-    // their own were found to differ when the job was read
-    let is_taken = |p: &&Picture| p.settings.aovs.is_empty() && places.contains(Path::new(&p.picture));
-    match job.pictures.iter().find(is_taken) {
-        Some(picture) => Err(RunError::Twice(job.folder.join(&picture.picture))),
+    let mut places = HashSet::new();
+    match job.pictures.iter().flat_map(files_of).find(|file| !places.insert(file.clone())) {
+        Some(file) => Err(RunError::Twice(job.folder.join(file))),
         None => Ok(()),
     }
 }
@@ -61,7 +59,7 @@ pub(super) fn each_has_its_place(job: &Job) -> Result<(), RunError> {
 /// Refuses a background that none of the frames will have.
 pub(super) fn background_is_there(job: &Job) -> Result<(), RunError> {
     let missing = |picture: &Picture| match &picture.settings.background {
-        Background::File(file) if !file.exists() => Some(file.clone()),
+        Background::File(file) if !file.is_file() => Some(file.clone()),
         _ => None,
     };
     let mut files = job.pictures.iter().map(missing);

@@ -110,11 +110,11 @@ pub enum RunError {
     /// A picture would go where an input is.
     #[error("{} is an input of this job and would be overwritten; nothing is rendered (-o names another folder)", .0.display())]
     OverInput(PathBuf),
-    /// A picture would take the place of an auxiliary one.
-    #[error("{} would be the picture of one frame and an auxiliary one of another; nothing is rendered (--name names them otherwise)", .0.display())]
+    /// An auxiliary picture would take the place of another picture.
+    #[error("{} would be written for two frames, for one as an auxiliary picture; nothing is rendered (--name names them otherwise)", .0.display())]
     Twice(PathBuf),
     /// The background of all frames is not there.
-    #[error("{}: there is no such background; nothing is rendered", .0.display())]
+    #[error("{}: cannot be the background: it is not there, or is no plain file; nothing is rendered", .0.display())]
     Background(PathBuf),
     /// The report would go where a part of the job is.
     #[error("{}: the report cannot stand there: {why}; nothing is rendered (--report names another file)", .file.display())]
@@ -127,6 +127,9 @@ pub enum RunError {
     /// The report cannot be written.
     #[error(transparent)]
     Unsaved(#[from] Unsaved),
+    /// A file stands where the output folder should.
+    #[error("{}: is no folder for pictures; nothing is rendered (-o names one)", .0.display())]
+    NoFolder(PathBuf),
     /// The output folder cannot be used.
     #[error(transparent)]
     Output(#[from] OutputError),
@@ -181,6 +184,9 @@ pub fn render(
 ) -> Result<Outcome, RunError> {
     let since = Stopwatch::start();
     let [rss_before, peak_before] = [machine::rss_bytes(), machine::peak_rss_bytes()];
+    if job.folder.exists() && !job.folder.is_dir() {
+        return Err(RunError::NoFolder(job.folder.clone()));
+    }
     let records = Records::read(&job.folder)?;
     check::nothing_is_lost(job, &records, options)?;
     check::each_has_its_place(job)?;

@@ -167,7 +167,7 @@ impl<'a> Reader<'a> {
         let shot = match self.prepared.shot(picture, &views) {
             Ok(shot) => shot,
             Err(error) => {
-                report.error = Some(error);
+                report.error = Some(format!("{}: {error}", report.named()));
                 return Err(report);
             }
         };
