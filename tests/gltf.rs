@@ -176,6 +176,12 @@ fn a_gltf_file_is_an_input() {
     assert!(said.contains("`stay`") && said.contains("`go`"), "{said}");
     let said = render(t, &file, "none", &["--fps", "2", "--memory", "1"], 3).stderr;
     assert!(said.contains("mover.gltf: frame 2: "), "{said}");
+    // what is wrong with the file is wrong with each of its frames, and told once
+    let text = std::fs::read_to_string(&file).unwrap();
+    std::fs::write(&file, text.replace("\"count\":3", "\"count\":3000")).unwrap();
+    let said = render(t, &file, "none", &["--fps", "2"], 1).stderr;
+    assert_eq!(said.matches("error: ").count(), 2, "{said}");
+    assert!(said.contains("error: the same for 2 more frames: "), "{said}");
     std::fs::write(&file, "{}").unwrap();
     let said = render(t, &file, "none", &[], 2).stderr;
     assert!(said.contains("mover.gltf") && said.contains("export it again"), "{said}");

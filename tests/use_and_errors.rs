@@ -108,6 +108,9 @@ fn events_are_one_json_object_a_line() {
     let events: Vec<serde_json::Value> = said.lines().map(|l| serde_json::from_str(l).unwrap()).collect();
     let kinds: Vec<&str> = events.iter().map(|e| e["event"].as_str().unwrap()).collect();
     assert_eq!(kinds, ["start", "frame", "frame", "end"]);
+    let said = render(t, &t.join("absent"), "out", &["--json"], 2);
+    let event: serde_json::Value = serde_json::from_str(&said.stdout).unwrap();
+    assert!(event["event"] == "error" && said.stderr.contains(event["text"].as_str().unwrap()), "{event}");
     // two writers may end in either order
     let of = |number: i64| events.iter().find(|e| e["frame"] == number).unwrap();
     let frame = of(1);

@@ -158,7 +158,11 @@ pub fn main() -> ExitCode {
         Command::Completions { shell } => Ok(completions::completions(*shell)),
     };
     ended.unwrap_or_else(|error| {
-        err!("error: {}", said_once(&error));
+        let text = said_once(&error);
+        if cli.global.json {
+            out!("{}", serde_json::json!({"event": "error", "text": text}));
+        }
+        err!("error: {text}");
         ExitCode::from(EXIT_USE)
     })
 }

@@ -47,6 +47,8 @@ pub(super) struct Progress {
     failed: usize,
     /// For how many files each warning came.
     warned: BTreeMap<String, usize>,
+    /// For how many frames each error came: those of an animation have one file.
+    errors: BTreeMap<String, usize>,
 }
 
 const PLAIN_EVERY_S: f64 = 5.0;
@@ -82,6 +84,7 @@ impl Progress {
             ended: 0,
             failed: 0,
             warned: BTreeMap::new(),
+            errors: BTreeMap::new(),
         }
     }
 
@@ -114,7 +117,12 @@ impl Progress {
         self.ended += 1;
         if frame.status == Status::Failed {
             self.failed += 1;
-            self.line(&format!("error: {}", frame.error.as_deref().unwrap_or("failed")));
+            let error = frame.error.as_deref().unwrap_or("failed");
+            let frames = self.errors.entry(error.to_string()).or_default();
+            *frames += 1;
+            if *frames == 1 || self.verbose {
+                self.line(&format!("error: {error}"));
+            }
         } else if self.verbose {
             let ms = |x: Option<f64>| x.map_or_else(|| "–".to_string(), |x| format!("{x:.1}"));
             self.line(&format!(
@@ -185,6 +193,9 @@ impl Progress {
             if failed > 0 {
                 out!("openjd_fail: {failed} frames failed");
             }
+        }
+        for (error, frames) in self.errors.iter().filter(|(_, frames)| **frames > 1 && !self.verbose) {
+            err!("error: the same for {} more frames: {error}", frames - 1);
         }
         for (text, files) in self.warned.iter().filter(|(_, files)| **files > FILES_TOLD && !self.verbose) {
             err!("warning: the same for {} more files: {text}", files - FILES_TOLD);

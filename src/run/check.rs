@@ -3,16 +3,37 @@
 
 use super::event::{FrameReport, Status};
 use super::read::{encoding, read_options};
-use super::report::Report;
+use super::report::{MARK as REPORT, Report};
 use super::{RunError, RunOptions};
+use crate::device::Stop;
 use crate::format;
 use crate::job::{Background, Job, Picture};
 use crate::output::{self, Records, file_names};
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 
+/// All that is looked at before the first frame; the records of earlier runs.
+pub(super) fn before(job: &Job, options: &RunOptions, stop: &Stop) -> Result<Records, RunError> {
+    if job.folder.exists() && !job.folder.is_dir() {
+        return Err(RunError::NoFolder(job.folder.clone()));
+    }
+    let records = Records::read(&job.folder)?;
+    nothing_is_lost(job, &records, options)?;
+    each_has_its_place(job)?;
+    background_is_there(job)?;
+    if let Some(file) = &options.report
+        && let Some(why) = part_of_job(job, file, REPORT)
+    {
+        return Err(RunError::ReportPlace { file: file.clone(), why });
+    }
+    if !stop.asked() {
+        can_be_written(job, &records, options)?;
+    }
+    Ok(records)
+}
+
 /// Refuses to write over inputs, and over files that no record names.
-pub(super) fn nothing_is_lost(job: &Job, records: &Records, options: &RunOptions) -> Result<(), RunError> {
+fn nothing_is_lost(job: &Job, records: &Records, options: &RunOptions) -> Result<(), RunError> {
     let there: Vec<PathBuf> = job
         .pictures
         .iter()
@@ -35,7 +56,7 @@ pub(super) fn nothing_is_lost(job: &Job, records: &Records, options: &RunOptions
 }
 
 /// Makes the output folder; refuses one where nothing can be written, unless all pictures are there.
-pub(super) fn can_be_written(job: &Job, records: &Records, options: &RunOptions) -> Result<(), RunError> {
+fn can_be_written(job: &Job, records: &Records, options: &RunOptions) -> Result<(), RunError> {
     let is_there = |p: PathBuf| records.names(&p) && job.folder.join(p).is_file();
     let are_there = job.pictures.iter().all(|picture| files_of(picture).into_iter().all(is_there));
     if are_there && (!options.overwrite || job.pictures.is_empty()) {
@@ -45,7 +66,7 @@ pub(super) fn can_be_written(job: &Job, records: &Records, options: &RunOptions)
 }
 
 /// Refuses auxiliary pictures that would take the place of others; pictures were found to differ when the job was read.
-pub(super) fn each_has_its_place(job: &Job) -> Result<(), RunError> {
+fn each_has_its_place(job: &Job) -> Result<(), RunError> {
     if job.pictures.iter().all(|picture| picture.settings.aovs.is_empty()) {
         return Ok(());
     }
@@ -57,7 +78,7 @@ pub(super) fn each_has_its_place(job: &Job) -> Result<(), RunError> {
 }
 
 /// Refuses a background that none of the frames will have.
-pub(super) fn background_is_there(job: &Job) -> Result<(), RunError> {
+fn background_is_there(job: &Job) -> Result<(), RunError> {
     let missing = |picture: &Picture| match &picture.settings.background {
         Background::File(file) if !file.is_file() => Some(file.clone()),
         _ => None,

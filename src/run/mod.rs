@@ -37,7 +37,7 @@ use crate::clock::Stopwatch;
 use crate::device::{DeviceKind, Stop};
 use crate::film::LatentFilm;
 use crate::job::Job;
-use crate::output::{self, OutputError, Records, RunLog};
+use crate::output::{self, OutputError, RunLog};
 use crate::plan::Update;
 use crate::schedule::ScheduleError;
 use crate::store::Store;
@@ -184,21 +184,7 @@ pub fn render(
 ) -> Result<Outcome, RunError> {
     let since = Stopwatch::start();
     let [rss_before, peak_before] = [machine::rss_bytes(), machine::peak_rss_bytes()];
-    if job.folder.exists() && !job.folder.is_dir() {
-        return Err(RunError::NoFolder(job.folder.clone()));
-    }
-    let records = Records::read(&job.folder)?;
-    check::nothing_is_lost(job, &records, options)?;
-    check::each_has_its_place(job)?;
-    check::background_is_there(job)?;
-    if let Some(file) = &options.report
-        && let Some(why) = check::part_of_job(job, file, report::MARK)
-    {
-        return Err(RunError::ReportPlace { file: file.clone(), why });
-    }
-    if !stop.asked() {
-        check::can_be_written(job, &records, options)?;
-    }
+    let records = check::before(job, options, stop)?;
     let mut saved = report::Saver::new(options.report.clone());
     let mut report = Report::new(fleet.reports(), options.keeps_reports || options.report.is_some());
     saved.save(&mut report, &since, true)?;
