@@ -181,7 +181,7 @@ fn a_gltf_file_is_an_input() {
     std::fs::write(&file, text.replace("\"count\":3", "\"count\":3000")).unwrap();
     let said = render(t, &file, "none", &["--fps", "2"], 1).stderr;
     assert_eq!(said.matches("error: ").count(), 2, "{said}");
-    assert!(said.contains("error: the same for 2 more frames: "), "{said}");
+    assert!(said.contains("error: the same 2 more times: "), "{said}");
     std::fs::write(&file, "{}").unwrap();
     let said = render(t, &file, "none", &[], 2).stderr;
     assert!(said.contains("mover.gltf") && said.contains("export it again"), "{said}");

@@ -64,7 +64,7 @@ pub struct Global {
     json: bool,
     /// Colours on a terminal
     #[arg(long, global = true, value_name = "WHEN", default_value = "auto")]
-    color: Color,
+    color: Color, // [`say::color`] reads it before all else: wrong use is told in colours, too
 }
 
 /// When to use colours.

@@ -47,7 +47,7 @@ pub(super) struct Progress {
     failed: usize,
     /// For how many files each warning came.
     warned: BTreeMap<String, usize>,
-    /// For how many frames each error came: those of an animation have one file.
+    /// How many times each error came: all frames of an animation have one file.
     errors: BTreeMap<String, usize>,
 }
 
@@ -118,9 +118,9 @@ impl Progress {
         if frame.status == Status::Failed {
             self.failed += 1;
             let error = frame.error.as_deref().unwrap_or("failed");
-            let frames = self.errors.entry(error.to_string()).or_default();
-            *frames += 1;
-            if *frames == 1 || self.verbose {
+            let times = self.errors.entry(error.to_string()).or_default();
+            *times += 1;
+            if *times == 1 || self.verbose {
                 self.line(&format!("error: {error}"));
             }
         } else if self.verbose {
@@ -194,8 +194,8 @@ impl Progress {
                 out!("openjd_fail: {failed} frames failed");
             }
         }
-        for (error, frames) in self.errors.iter().filter(|(_, frames)| **frames > 1 && !self.verbose) {
-            err!("error: the same for {} more frames: {error}", frames - 1);
+        for (error, times) in self.errors.iter().filter(|(_, times)| **times > 1 && !self.verbose) {
+            err!("error: the same {} more times: {error}", times - 1);
         }
         for (text, files) in self.warned.iter().filter(|(_, files)| **files > FILES_TOLD && !self.verbose) {
             err!("warning: the same for {} more files: {text}", files - FILES_TOLD);

@@ -34,18 +34,20 @@ pub(super) fn color(words: impl IntoIterator<Item = std::ffi::OsString>) -> Colo
     choice
 }
 
+/// A line in one piece: others may write to the same place.
 pub(super) fn out(line: Arguments) {
-    let _ = writeln!(std::io::stdout().lock(), "{line}");
+    let _ = std::io::stdout().write_all(format!("{line}\n").as_bytes());
 }
 
 pub(super) fn err(line: Arguments) {
-    let line = line.to_string();
-    let mut stream = anstream::stderr().lock();
-    let labels = [("error:", "\x1b[1;31m"), ("warning:", "\x1b[1;33m")];
-    let _ = match labels.iter().find_map(|(label, style)| Some((label, style, line.strip_prefix(label)?))) {
-        Some((label, style, rest)) => writeln!(stream, "{style}{label}\x1b[0m{rest}"),
-        None => writeln!(stream, "{line}"),
+    let line = format!("{line}\n");
+    let styles = [("error:", "\x1b[1;31m"), ("warning:", "\x1b[1;33m")];
+    let colored = |(label, style): &(&str, &str)| {
+        line.strip_prefix(label).map(|rest| format!("{style}{label}\x1b[0m{rest}"))
     };
+    let has_colors = anstream::stderr().current_choice() != ColorChoice::Never;
+    let colored = if has_colors { styles.iter().find_map(colored) } else { None };
+    let _ = std::io::stderr().write_all(colored.as_ref().unwrap_or(&line).as_bytes());
 }
 
 #[cfg(test)]

@@ -1,5 +1,5 @@
-//! Which files a whole run left in an output folder: `DIR/.rentix/pictures`. Records do not say it, for they
-//! name what earlier runs made, too.
+//! Which files a whole run left in an output folder: `DIR/.rentix/pictures`. Records do not say it, for they name what
+//! earlier runs made, too.
 //!
 //! A line a file, relative to the folder, as records write names.
 

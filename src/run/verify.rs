@@ -5,7 +5,6 @@ use crate::device::Stop;
 use crate::job::{Job, Order};
 use crate::output;
 use crate::scene::Aov;
-use std::fs;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -58,10 +57,7 @@ pub fn verify<E: From<RunError>>(
 ) -> Result<(Verdict, Outcome), E> {
     let room = tempfile::tempdir().map_err(RunError::NoRoom)?;
     let mut run = |way: Way| -> Result<Outcome, E> {
-        let folder = room.path().join(way.name);
-        // a run whose frames all fail makes none
-        fs::create_dir(&folder).map_err(RunError::NoRoom)?;
-        let job = job_of(job, way, &folder);
+        let job = job_of(job, way, &room.path().join(way.name));
         let options = RunOptions { cold: way.cold, report: None, overwrite: false, ..options.clone() };
         Ok(render(&job, &options, &fleet()?, stop, &mut |event| on_event(&way, event))?)
     };
